@@ -5,20 +5,50 @@ mod drive;
 use std::{
     collections::BTreeMap,
     fs,
-    path::{Path, absolute},
+    num::NonZeroUsize,
+    path::{Path, PathBuf, absolute},
     process::ExitCode,
     thread,
 };
 
+use clap::Args;
 use gyre_configuration::paths::shipped;
 use gyre_results::{Content, Out};
 use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
 use gyre_tools::batch::{Batch, Ended, List, Outcome, Settings, compute, table};
 
-use crate::cli::BatchArguments;
-
 pub use drive::drive;
+
+#[derive(Debug, Args)]
+pub struct BatchArguments {
+    /// The drives: a text file with the path of a recording in each line, a CSV file with the
+    /// columns drive, name, configuration and set, or a folder whose sub-folders are recordings.
+    pub list: PathBuf,
+    /// The folder of the batch. The files of an earlier call are kept and completed.
+    #[arg(long, default_value = "out/batch")]
+    pub out: PathBuf,
+    /// The configuration of the drives that name none. Default: settings from each recording's
+    /// format and its scans.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Override a key of each configuration, as in slam.kind=graph; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Runs at once. Default: as many as there are processors, since a run alone is bounded by its
+    /// slowest stage.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<NonZeroUsize>,
+    /// Compute only the drives of this task, from 0, of those that share the list.
+    #[arg(long, value_name = "I", requires = "tasks")]
+    pub task: Option<usize>,
+    /// The number of tasks that share the list.
+    #[arg(long, value_name = "N", requires = "task")]
+    pub tasks: Option<usize>,
+    /// Compute nothing: write the table of the existing results.
+    #[arg(long, conflicts_with = "task")]
+    pub collect: bool,
+}
 
 /// Computes the drives of a list that are not complete, and writes the table. The exit code is 0 if
 /// all are complete, 1 if not, and 130 after an interruption.
@@ -47,8 +77,7 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         None => Some(Out::lock_for(&arguments.out, Content::BATCH)?),
         Some(_) => None,
     };
-    fs::create_dir_all(&arguments.out)
-        .map_err(|error| format!("cannot write to {}: {error}", arguments.out.display()))?;
+    gyre_storage::create_folder(&arguments.out)?;
     let batch = Batch {
         program: own(),
         list: &list,
@@ -113,9 +142,6 @@ fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
         0 => String::new(),
         earlier => format!("; {earlier} had been computed before"),
     };
-    match drives {
-        0 => "no drives".to_owned(),
-        1 => format!("1 drive: {each}{earlier}"),
-        _ => format!("{drives} drives: {each}{earlier}"),
-    }
+    let plural = if drives == 1 { "" } else { "s" };
+    format!("{drives} drive{plural}: {each}{earlier}")
 }

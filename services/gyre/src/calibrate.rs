@@ -5,26 +5,60 @@ mod check;
 mod sensors;
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
+use clap::Args;
 use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
-use gyre_configuration::{Configuration, Played, describe_masks_in_process};
-use gyre_datasets::DatasetOptions;
+use gyre_configuration::{Configuration, Played, describe_masks, with_stored_options};
 use gyre_radar::{OwnedScan, SweepGeometry};
 use gyre_results::{Content, Out};
 use gyre_samples::{GyroKind, WheelsKind};
 use gyre_storage as storage;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, inputs::Inputs, print};
+use gyre_tools::bar::Bar;
 
-use crate::cli::CalibrateArguments;
 use sensors::{Gyro, Wheels};
+
+#[derive(Debug, Args)]
+pub struct CalibrateArguments {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Another drive of the same radar, read in the same way: the file has the constants from all
+    /// drives together. May be repeated.
+    #[arg(long, value_name = "RECORDING")]
+    pub with: Vec<PathBuf>,
+    /// The folder of calibration.toml and calibration.svg.
+    #[arg(long, default_value = "out/calibrate")]
+    pub out: PathBuf,
+    /// The log of a gyro, a table as CSV: its clock and its axes are found too. Default: what lies
+    /// beside the scans.
+    #[arg(long, value_name = "FILE", conflicts_with = "with")]
+    pub gyro: Option<PathBuf>,
+    /// The log of the wheels, a table as CSV: its clock and its scale are found too. Default: what
+    /// lies beside the scans.
+    #[arg(long, value_name = "FILE", conflicts_with = "with")]
+    pub wheels: Option<PathBuf>,
+    /// Length of the path by an odometer or GNSS, m: without it the range resolution is
+    /// undetermined.
+    #[arg(long, value_parser = length, conflicts_with = "with")]
+    pub distance_m: Option<f64>,
+    /// Maximum number of scans of a drive. Their points are kept in memory.
+    #[arg(long, default_value = "2000")]
+    pub scans: usize,
+}
+
+/// Parses a length: a positive number.
+fn length(text: &str) -> Result<f64, String> {
+    let length = text.parse().ok();
+    let length = length.filter(|length: &f64| length.is_finite() && *length > 0.0);
+    length.ok_or_else(|| "a number above 0 is needed".to_owned())
+}
 
 const SECTION: &str = "calibration.toml";
 const PICTURE: &str = "calibration.svg";
-const EVERY: Duration = Duration::from_secs(5);
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
@@ -131,13 +165,13 @@ impl Recorded {
         configuration.odometry.wheels.kind = WheelsKind::None;
         let configuration = &configuration;
         let (drive, geometry) = read(configuration, arguments)?;
-        let eccentricity_rad = options(configuration)?.azimuth_eccentricity_rad;
+        let dataset = with_stored_options(configuration)?.dataset;
         Ok(Self {
             name: configuration.data(),
             drive,
             configured: Configured {
                 geometry,
-                eccentricity_rad: eccentricity_rad.unwrap_or(0.0).into(),
+                eccentricity_rad: dataset.azimuth_eccentricity_rad.unwrap_or(0.0).into(),
                 min_range_m: configuration.odometry.points.min_range_m.into(),
                 distance_m: arguments.distance_m,
             },
@@ -180,24 +214,13 @@ impl Recorded {
     }
 }
 
-/// The options of the dataset, merged with the recording's own `dataset.toml`.
-fn options(configuration: &Configuration) -> Result<DatasetOptions, Failure> {
-    let own = configuration.dataset;
-    match configuration.streamed() {
-        Some(_) => Ok(own),
-        None => Ok(own.or(&gyre_recording::stored_options(&configuration.source.data)?)),
-    }
-}
-
 /// Registers the scans of a recording, as many as are asked for at most.
 fn read(
     configuration: &Configuration,
     arguments: &CalibrateArguments,
 ) -> Result<(Drive, SweepGeometry), Failure> {
     let Played { mut dataset, .. } = gyre_configuration::open(configuration)?;
-    describe_masks_in_process(configuration)?
-        .iter()
-        .for_each(print::note);
+    describe_masks(configuration)?.iter().for_each(print::note);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
     let played = configuration.source.played(dataset.scans());
@@ -210,7 +233,7 @@ fn read(
         }
         print::note(sentence);
     }
-    let mut last_line = Instant::now();
+    let mut progress = Bar::new(Some(count));
     for (done, number) in played.take(count).enumerate() {
         let pushed = match dataset.read(number, scan.slot()) {
             Ok(geometry) => {
@@ -220,12 +243,10 @@ fn read(
             Err(error) => Err(error.to_string()),
         };
         if let Err(reason) = pushed {
-            print::note(format_args!("left out scan {number}: {reason}"));
+            progress.say(&format!("left out scan {number}: {reason}"));
         }
-        if last_line.elapsed() >= EVERY {
-            print::note(format_args!("read {done} of {count} scans"));
-            last_line = Instant::now();
-        }
+        progress.scans(done as u64, done as u64, "read".to_owned());
     }
+    progress.finish();
     Ok((drive, scan.geometry))
 }

@@ -1,21 +1,14 @@
 //! The command line.
 
-mod batch;
-mod conformance;
 mod help;
 mod link;
-mod record;
 mod ros2;
-mod shadow;
-mod stress;
-mod watch;
 
-use std::{io::IsTerminal, num::NonZeroUsize, path::PathBuf};
+use std::{io::IsTerminal, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use gyre_results::{Form, evaluate::EvaluateArguments};
 use gyre_run::Rate;
-use gyre_simulator::OutputFormat;
 use gyre_terminal::Failure;
 use gyre_terminal::inputs::{ConfigArguments, Given, Inputs};
 use gyre_tools::export::ExportArguments;
@@ -29,15 +22,15 @@ use gyre_tools::operate::{
 use gyre_tools::radar_server::RadarServerArguments;
 use gyre_tools::report::ReportArguments;
 
-pub use batch::BatchArguments;
-pub use conformance::ConformanceArguments;
+use crate::{
+    batch::BatchArguments, calibrate::CalibrateArguments, conformance::ConformanceArguments,
+    inspect::InspectArguments, record::RecordArguments, shadow::ShadowArguments,
+    simulate::SimulateArguments, stress::StressArguments, watch::WatchArguments,
+};
+
 pub use help::command;
 pub use link::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
-pub use record::{RecordArguments, SplitArguments};
 pub use ros2::Ros2Arguments;
-pub use shadow::ShadowArguments;
-pub use stress::StressArguments;
-pub use watch::WatchArguments;
 
 /// Radar odometry as cooperating processes over shared memory.
 ///
@@ -208,7 +201,7 @@ pub struct RunOptions {
     #[arg(long)]
     pub rate: Option<Rate>,
     /// Record the run to this file, NAME.mcap (record.file).
-    #[arg(long, value_name = "FILE", value_parser = record::recording)]
+    #[arg(long, value_name = "FILE", value_parser = crate::record::recording)]
     pub record: Option<PathBuf>,
     /// Print all figures at the end, as where the output is no terminal.
     #[arg(short, long)]
@@ -241,80 +234,4 @@ impl RunArguments {
             false => Ok(given),
         }
     }
-}
-
-#[derive(Debug, Args)]
-pub struct InspectArguments {
-    #[command(flatten)]
-    pub inputs: Inputs,
-    /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
-    #[arg(long)]
-    pub trajectory: Option<PathBuf>,
-    /// Print JSON.
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Debug, Args)]
-pub struct CalibrateArguments {
-    #[command(flatten)]
-    pub inputs: Inputs,
-    /// Another drive of the same radar, read in the same way: the file has the constants from all
-    /// drives together. May be repeated.
-    #[arg(long, value_name = "RECORDING")]
-    pub with: Vec<PathBuf>,
-    /// The folder of calibration.toml and calibration.svg.
-    #[arg(long, default_value = "out/calibrate")]
-    pub out: PathBuf,
-    /// The log of a gyro, a table as CSV: its clock and its axes are found too. Default: what lies
-    /// beside the scans.
-    #[arg(long, value_name = "FILE", conflicts_with = "with")]
-    pub gyro: Option<PathBuf>,
-    /// The log of the wheels, a table as CSV: its clock and its scale are found too. Default: what
-    /// lies beside the scans.
-    #[arg(long, value_name = "FILE", conflicts_with = "with")]
-    pub wheels: Option<PathBuf>,
-    /// Length of the path by an odometer or GNSS, m: without it the range resolution is
-    /// undetermined.
-    #[arg(long, value_parser = length, conflicts_with = "with")]
-    pub distance_m: Option<f64>,
-    /// Maximum number of scans of a drive. Their points are kept in memory.
-    #[arg(long, default_value = "2000")]
-    pub scans: usize,
-}
-
-#[derive(Debug, Args)]
-pub struct SimulateArguments {
-    /// The configuration, a TOML file or a name that `gyre config` lists: its section
-    /// `[simulation]` is used. Default: the defaults of that section.
-    pub configuration: Option<PathBuf>,
-    /// The folder of the recording. The files of an earlier call with the same configuration are
-    /// kept and completed.
-    #[arg(long)]
-    pub out: PathBuf,
-    /// Number of scans (simulation.scans).
-    #[arg(long)]
-    pub scans: Option<usize>,
-    /// Drive along this file: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv.
-    #[arg(long, value_name = "FILE")]
-    pub trajectory: Option<PathBuf>,
-    /// Seed (simulation.seed).
-    #[arg(long)]
-    pub seed: Option<u64>,
-    /// The format of the files: oxford, boreas or radiate (simulation.output.format).
-    #[arg(long)]
-    pub format: Option<OutputFormat>,
-    /// Threads to render on. Default: all processors. The files are the same whatever their number.
-    #[arg(long)]
-    pub threads: Option<NonZeroUsize>,
-    /// Override a key, as in simulation.drive.speed_mps=5; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-}
-
-/// Parses a length: a positive number.
-fn length(text: &str) -> Result<f64, String> {
-    let length = text.parse().ok();
-    let length = length.filter(|length: &f64| length.is_finite() && *length > 0.0);
-    length.ok_or_else(|| "a number above 0 is needed".to_owned())
 }

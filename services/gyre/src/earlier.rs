@@ -12,14 +12,14 @@ use gyre_configuration::Configuration;
 use gyre_journal::{
     self as journal, Content, JournalError,
     checkpoint::{self, Checkpoint, CheckpointError},
-    keyframes::{KeyframesError, complete_poses},
+    keyframes::complete_poses,
     objects::LoggedObjects,
     scans::{LoggedScan, complete_scans},
 };
 use gyre_messages::StageId;
 use gyre_recorder::Ledger;
 use gyre_recording::received_fixes;
-use gyre_results::{FILES, Holds, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
+use gyre_results::{FILES, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
 use gyre_run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
@@ -89,17 +89,16 @@ impl Earlier {
             });
         }
         let content = journal::check(&path).map_err(|error| kept(error, &path))?;
-        let holds = Holds::Unfinished(content.poses);
-        let is_empty = content.poses == 0 && !content.ended;
-        let identity = match is_empty {
-            true => return Ok(without_poses(out, configuration, programs)),
-            false => Identity::read(out, holds),
-        };
-        let require = |it: &Identity| it.require(configuration, programs, out.path(), holds);
-        let identity = match identity.and_then(|it| require(&it).map(|()| it)) {
+        if content.poses == 0 && !content.ended {
+            return Ok(without_poses(out, configuration, programs));
+        }
+        let identity = match Identity::read(out) {
             Err(reason) => return Ok(Self::Foreign(reason)),
             Ok(identity) => identity,
         };
+        if let Err(another) = identity.require(configuration, programs) {
+            return Ok(Self::Foreign(foreign(out, UNFINISHED, &another)));
+        }
         let poses = match content.ended {
             true => content.poses,
             false => known_poses(out, configuration, &content)?,
@@ -109,10 +108,8 @@ impl Earlier {
             lost: content.poses - poses + content.torn,
             identity,
         };
-        let is_followed = (!configuration.slam.is_on()
-            || has_ended::<Query>(out, "finds the loops")?)
-            && (!configuration.objects.is_on()
-                || has_ended::<LoggedObjects>(out, "tracks the objects")?);
+        let is_followed = (!configuration.slam.is_on() || has_ended::<Query>(out)?)
+            && (!configuration.objects.is_on() || has_ended::<LoggedObjects>(out)?);
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
             (true, _) => Self::Unfinished(begun),
@@ -120,9 +117,7 @@ impl Earlier {
             (false, _) => Self::Unfinished(begun),
         })
     }
-}
 
-impl Earlier {
     pub fn unfinished(&self) -> Option<&Begun> {
         match self {
             Self::Unfinished(begun) => Some(begun),
@@ -131,34 +126,54 @@ impl Earlier {
     }
 
     /// Returns whether a run of this identity continues the recording that was begun before.
-    pub fn recording_goes_on(&self, identity: &Identity, out: &Out) -> bool {
-        let holds = Holds::Unfinished(0);
-        let is_same = |begun: &Identity| begun.require_recording(identity, out.path(), holds);
+    pub fn recording_goes_on(&self, identity: &Identity) -> bool {
         match self {
             Self::Unfinished(_) => true,
-            Self::WithoutPoses(begun_with) => is_same(begun_with).is_ok(),
+            Self::WithoutPoses(begun_with) => begun_with.require_recording(identity).is_ok(),
             Self::Nothing | Self::Ended(_) | Self::Complete(_) | Self::Foreign(_) => false,
         }
     }
 
     /// The identity of the run in the folder, which the new one must have too.
-    pub fn identity(&self) -> Option<(&Identity, Holds)> {
+    pub fn identity(&self) -> Option<&Identity> {
         match self {
             Self::Nothing | Self::WithoutPoses(_) | Self::Foreign(_) => None,
-            Self::Complete(identity) => Some((identity, Holds::Complete)),
-            Self::Unfinished(begun) | Self::Ended(begun) => {
-                Some((&begun.identity, Holds::Unfinished(begun.poses)))
-            }
+            Self::Complete(identity) => Some(identity),
+            Self::Unfinished(begun) | Self::Ended(begun) => Some(&begun.identity),
         }
     }
+
+    /// Checks that a new run with this identity plays the same recording.
+    pub fn require_recording(&self, now: &Identity, out: &Out) -> Result<(), Failure> {
+        let state = match self {
+            Self::Complete(_) => COMPLETED,
+            _ => UNFINISHED,
+        };
+        let required = self.identity().map(|it| it.require_recording(now));
+        required
+            .unwrap_or(Ok(()))
+            .map_err(|another| foreign(out, state, &another))
+    }
+}
+
+/// States of a run that another one does not replace.
+const UNFINISHED: &str = "an unfinished";
+const COMPLETED: &str = "a complete";
+
+fn foreign(out: &Out, state: &str, another: &Failure) -> Failure {
+    let out = out.path().display();
+    format!(
+        "{out} holds {state} run of {another}: choose another --out, or discard it with --fresh"
+    )
+    .into()
 }
 
 /// Anything begun there may begin again, and the same run may continue its recording.
 fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) -> Earlier {
-    let holds = Holds::Unfinished(0);
-    let require = |it: &Identity| it.require(configuration, programs, out.path(), holds);
-    match Identity::read(out, holds) {
-        Ok(identity) if require(&identity).is_ok() => Earlier::WithoutPoses(identity),
+    match Identity::read(out) {
+        Ok(identity) if identity.require(configuration, programs).is_ok() => {
+            Earlier::WithoutPoses(identity)
+        }
         _ => Earlier::Nothing,
     }
 }
@@ -169,8 +184,9 @@ fn complete(
     configuration: &Configuration,
     programs: &Programs,
 ) -> Result<Earlier, Failure> {
-    let identity = Identity::read(out, Holds::Complete)?;
-    identity.require(configuration, programs, out.path(), Holds::Complete)?;
+    let identity = Identity::read(out)?;
+    let required = identity.require(configuration, programs);
+    required.map_err(|another| foreign(out, COMPLETED, &another))?;
     // Drops in live mode depend on the load, and the base has the scans of its robot.
     let is_live = configuration.is_radar() || configuration.run.mode == Mode::Live;
     if is_live || configuration.is_side(Side::Base) {
@@ -200,12 +216,12 @@ pub fn is_complete(out: &Path) -> bool {
     out.join(COMPLETE).exists()
 }
 
-/// A damaged log may be removed, and is then computed again in these words.
-fn has_ended<R: gyre_slam::Record>(out: &Out, again: &str) -> Result<bool, Failure> {
+/// A damaged log may be removed, and is then computed again.
+fn has_ended<R: gyre_slam::Record>(out: &Out) -> Result<bool, Failure> {
     match RecordReader::<R>::open(out.path()) {
         Ok(records) => Ok(records.has_ended()),
         Err(error @ LogError::Damaged { .. }) => {
-            Err(format!("{error}: remove it, and the same command {again} anew").into())
+            Err(format!("{error}: remove it, and the same command computes it again").into())
         }
         Err(error) => Err(error.into()),
     }
@@ -240,11 +256,11 @@ fn known_poses(
 ) -> Result<u64, Failure> {
     let slam = &configuration.slam;
     let complete = match slam.is_on() {
-        true => complete_poses(out.path(), content.poses).map_err(damaged)?,
+        true => complete_poses(out.path(), content.poses)?,
         false => content.poses,
     };
     let complete = match configuration.objects.is_on() {
-        true => complete_scans(out.path(), complete).map_err(|error| damaged(error.into()))?,
+        true => complete_scans(out.path(), complete)?,
         false => complete,
     };
     if !configuration.starts(StageId::Refinement) {
@@ -315,16 +331,6 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
         "gyre: {reason}: that run is kept as {old}, and a new one begins in {new} (run.earlier)"
     ));
     Ok(Out::lock(path)?)
-}
-
-fn damaged(error: KeyframesError) -> Failure {
-    match error {
-        KeyframesError::Log(LogError::Damaged { .. }) => format!(
-            "{error}: restore it from a backup, choose another --out, or begin anew with --fresh"
-        )
-        .into(),
-        _ => error.into(),
-    }
 }
 
 fn state(out: &Path) -> [PathBuf; 12] {

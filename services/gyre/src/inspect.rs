@@ -1,23 +1,29 @@
 //! `gyre inspect`: reports the contents of a dataset.
 
-use std::process::ExitCode;
+use std::{path::PathBuf, process::ExitCode};
 
-use gyre_configuration::Configuration;
+use clap::Args;
 use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
-use gyre_terminal::inputs::Inputs;
+use gyre_terminal::inputs::{Inputs, configuration};
 use gyre_terminal::{Failure, print};
 
-use crate::cli::InspectArguments;
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
+    #[arg(long)]
+    pub trajectory: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
 
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments.trajectory.as_deref().map(read_trajectory);
     let trajectory = trajectory.transpose()?;
-    let Inputs { set, .. } = &arguments.inputs;
     let given = arguments.inputs.given_recording()?;
-    let configuration = match &given.configuration {
-        Some(named) => gyre_terminal::inputs::configuration(named, set)?,
-        None => Configuration::of_overrides(set)?,
-    };
+    let configuration = configuration(given.configuration.as_deref(), &arguments.inputs.set)?;
     let path = given.data.unwrap_or(configuration.source.data);
     let options = configuration.dataset;
     if path.as_os_str().is_empty() {
@@ -32,7 +38,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
         gyre_datasets::inspect_dataset(&path, dataset, &options, &logs, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
-        false => print::values(report)?,
+        false => print::line(report)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -18,6 +18,7 @@ pub mod preflight;
 pub mod program;
 pub mod progress;
 pub mod record;
+#[cfg(feature = "ros2")]
 pub mod ros2;
 pub mod run;
 pub mod shadow;
@@ -34,8 +35,6 @@ use gyre_configuration::{Configuration, schema};
 use gyre_terminal::{Failure, inputs::Inputs, print};
 
 use cli::{Command, RunArguments};
-#[cfg(not(feature = "link"))]
-use split::absent as link;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;
@@ -68,14 +67,20 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Swap(arguments) => gyre_tools::operate::swap(&arguments),
         Command::Echo(arguments) => gyre_tools::operate::echo(&arguments),
         Command::Watch(arguments) => watch::watch(&arguments),
+        #[cfg(feature = "ros2")]
         Command::Ros2(arguments) => ros2::publish(&arguments),
+        #[cfg(not(feature = "ros2"))]
+        Command::Ros2(_) => Err(features::absent("ROS 2").into()),
         Command::Shadow(arguments) => shadow::shadow(&arguments),
         Command::Batch(arguments) => batch::batch(&arguments),
         Command::BatchDrive { parent, run } => batch::drive(parent, &run),
         Command::Stress(arguments) => stress::stress(&arguments),
         Command::StressHelper { words } => stress::help(&words),
         Command::Record(arguments) => record::record(&arguments),
+        #[cfg(feature = "link")]
         Command::Link { end } => link::link(&end),
+        #[cfg(not(feature = "link"))]
+        Command::Link { .. } => Err(features::absent(features::LINK).into()),
         Command::Doctor => doctor(),
         Command::RadarServer(arguments) => gyre_tools::radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),

@@ -11,7 +11,7 @@ use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind};
-use gyre_samples::{GyroKind, MAX_SAMPLES, WheelsKind};
+use gyre_samples::{GyroKind, MAX_SAMPLES};
 use gyre_stage::{Manifest, run::free_shared_memory};
 use gyre_stages::live_radar::{Settings, Sizes};
 use gyre_stages::radar_replay::{Listing, Player};
@@ -19,7 +19,7 @@ use gyre_terminal::{Failure, print};
 use gyre_tools::maps::localise::searched_map;
 use rustix::process::{Resource, getrlimit};
 
-use crate::{ros2, split};
+use crate::split;
 
 pub struct Preflight {
     pub scans: Scans,
@@ -185,17 +185,16 @@ impl Scans {
 
     fn of_radar(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Self, Failure> {
         let is_in_ros2 = configuration.source.kind == SourceKind::Ros2;
-        let gyro_comes = match configuration.odometry.gyro.kind {
-            GyroKind::None | GyroKind::Udp => true,
-            GyroKind::Ros2 => is_in_ros2,
-            GyroKind::Auto | GyroKind::Log => false,
-        };
-        let wheels_come = match configuration.odometry.wheels.kind {
-            WheelsKind::None | WheelsKind::Udp => true,
-            WheelsKind::Ros2 => is_in_ros2,
-            WheelsKind::Auto | WheelsKind::Log => false,
-        };
-        for (sensor, comes) in [("gyro", gyro_comes), ("wheels", wheels_come)] {
+        let odometry = &configuration.odometry;
+        for (sensor, kind) in [
+            ("gyro", odometry.gyro.kind),
+            ("wheels", odometry.wheels.kind),
+        ] {
+            let comes = match kind {
+                GyroKind::None | GyroKind::Udp => true,
+                GyroKind::Ros2 => is_in_ros2,
+                GyroKind::Auto | GyroKind::Log => false,
+            };
             if !comes {
                 return Err(format!(
                     "{sensor}.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
@@ -203,7 +202,7 @@ impl Scans {
                 .into());
             }
         }
-        if configuration.odometry.doppler.is_used() {
+        if odometry.doppler.is_used() {
             return Err("doppler.kind is `auto`, but a live radar does not report which of its chirps rise: set it to `none`".into());
         }
         configuration.dataset.check()?;
@@ -220,7 +219,10 @@ impl Scans {
 pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
-        SourceKind::Ros2 => ros2::ask(source, options),
+        #[cfg(feature = "ros2")]
+        SourceKind::Ros2 => crate::ros2::ask(source, options),
+        #[cfg(not(feature = "ros2"))]
+        SourceKind::Ros2 => Err(crate::features::absent("ROS 2").into()),
         _ => Ok(gyre_stages::live_radar::ask(&Settings::of(
             source, options,
         )?)?),

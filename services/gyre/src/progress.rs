@@ -2,29 +2,19 @@
 
 mod silence;
 
-use std::{
-    fmt::Display,
-    io::IsTerminal,
-    time::{Duration, Instant},
-};
+use std::{fmt::Display, time::Instant};
 
-use gyre_messages::{FollowerId, Item, PoseHeader};
-use gyre_stage::{Manifest, clock, follower::Progress as Following, source::received_of};
+use gyre_messages::{Item, PoseHeader};
+use gyre_stage::{Manifest, clock, source::received_of};
 use gyre_supervise::Event;
-use gyre_terminal::{WIDTH, print, wrap};
-use indicatif::{ProgressBar, ProgressStyle};
+use gyre_tools::bar::Bar;
 
 use silence::Silence;
 
-const EVERY: Duration = Duration::from_secs(2);
-
 pub struct Progress {
-    bar: Option<ProgressBar>,
-    /// `/100`, or nothing without an end.
-    of: String,
+    bar: Bar,
     done: u64,
     since: Option<(Instant, u64)>,
-    last_line: Instant,
     /// Of a live run, until it ends.
     radar: Option<(Silence, Manifest)>,
 }
@@ -32,28 +22,15 @@ pub struct Progress {
 impl Progress {
     /// Starts with a run of `scans` scans, `resumed` of them already in the journal.
     pub fn new(scans: Option<usize>, resumed: usize, footprint: &impl Display) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let (bar, template) = match scans {
-                Some(scans) => (
-                    ProgressBar::new(scans as u64),
-                    "{bar:32} {pos}/{len} scans  {msg}",
-                ),
-                None => (ProgressBar::new_spinner(), "{spinner} {pos} scans  {msg}"),
-            };
-            let style = ProgressStyle::with_template(template);
-            bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        });
         let progress = Self {
-            bar,
-            of: scans.map_or(String::new(), |scans| format!("/{scans}")),
+            bar: Bar::new(scans),
             done: resumed as u64,
             since: None,
-            last_line: Instant::now(),
             radar: None,
         };
-        progress.say(&footprint.to_string());
+        progress.bar.say(&footprint.to_string());
         if resumed > 0 {
-            progress.say(&format!("resuming after {resumed} scans"));
+            progress.bar.say(&format!("resuming after {resumed} scans"));
         }
         progress
     }
@@ -66,11 +43,12 @@ impl Progress {
     pub fn show(&mut self, event: &Event<'_>) {
         match event {
             Event::Pose(pose) => self.pose(pose),
-            Event::Note(sentence) => self.say(sentence),
-            Event::Stalled(stall) => self.say(&stall.to_string()),
+            Event::Note(sentence) => self.bar.say(sentence),
+            Event::Stalled(stall) => self.bar.say(&stall.to_string()),
             Event::Following { follower, progress } => {
                 self.radar = None;
-                self.following(follower, *progress);
+                let (done, total) = (progress.done, progress.total);
+                self.bar.show(format!("{follower}: {done} of {total}"));
             }
             Event::Watched => self.silence(),
             Event::Stopping => self.radar = None,
@@ -79,30 +57,13 @@ impl Progress {
     }
 
     pub fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
+        self.bar.finish();
     }
 
     fn pose(&mut self, pose: &PoseHeader) {
-        let mut message = self.message(&pose.item);
-        match &self.bar {
-            Some(bar) => bar.set_position(self.done.saturating_add(pose.item.dropped())),
-            None => message = format!("{}{} scans  {message}", self.done, self.of),
-        }
-        self.show_message(message);
-    }
-
-    /// Shows a message in the bar, or now and then in a line.
-    fn show_message(&mut self, message: String) {
-        match &self.bar {
-            Some(bar) => bar.set_message(message),
-            None if self.last_line.elapsed() >= EVERY => {
-                self.last_line = Instant::now();
-                print::note(message);
-            }
-            None => {}
-        }
+        let message = self.message(&pose.item);
+        let passed = self.done.saturating_add(pose.item.dropped());
+        self.bar.scans(self.done, passed, message);
     }
 
     fn silence(&mut self) {
@@ -113,28 +74,9 @@ impl Progress {
         let Some(received) = received_of(manifest) else {
             return;
         };
-        let Some(report) = silence.update(&received, clock::now_ns()) else {
-            return;
-        };
-        if report.is_new {
-            self.say(&report.sentence);
+        if let Some(sentence) = silence.update(&received, clock::now_ns()) {
+            self.bar.say(&sentence);
         }
-        if let Some(bar) = &self.bar {
-            bar.set_message(report.sentence);
-        }
-    }
-
-    /// Reports the progress of a follower if the run has to wait for it.
-    fn following(&mut self, follower: &str, progress: Following) {
-        let (work, records) = match FollowerId::by_name(follower) {
-            Some(FollowerId::LoopClosure) => ("loop closing", "keyframes"),
-            Some(FollowerId::Objects) => ("objects", "scans"),
-            Some(FollowerId::Trajectory | FollowerId::Localisation) | None => {
-                (follower, "keyframes")
-            }
-        };
-        let Following { done, total } = progress;
-        self.show_message(format!("{work}: {done} of {total} {records}"));
     }
 
     /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen
@@ -147,13 +89,6 @@ impl Progress {
         let lag_ms = clock::now_ns().saturating_sub(pose.due_ns) as f64 * 1e-6;
         let dropped = pose.dropped();
         format!("{rate:.1} scans/s  lag {lag_ms:.0} ms  dropped {dropped}")
-    }
-
-    fn say(&self, line: &str) {
-        match &self.bar {
-            Some(bar) => bar.println(wrap(line, WIDTH).join("\n")),
-            None => print::note(line),
-        }
     }
 }
 

@@ -1,19 +1,54 @@
 //! `gyre record`: records a running run, from outside or as a process of it.
 
-use std::{process::ExitCode, time::Duration};
+use std::{path::PathBuf, process::ExitCode};
 
+use clap::Args;
 use gyre_recorder::{Options, Split};
 use gyre_terminal::{Failure, print, seconds};
+use gyre_tools::operate::RunChoice;
 
-use crate::cli::{RecordArguments, SplitArguments};
+#[derive(Debug, Args)]
+pub struct RecordArguments {
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// The file to write: NAME.mcap.
+    #[arg(long, value_name = "FILE", value_parser = recording)]
+    pub to: PathBuf,
+    /// The topics that are recorded: scan, masked, rotation, motion, refined, pose, loop,
+    /// correction, fix, log, health. Default: all of these in the run except masked and rotation.
+    #[arg(long, value_delimiter = ',')]
+    pub topics: Vec<String>,
+    /// Size of a file before the recording continues in the next file, MB; 0: any.
+    #[arg(long, default_value_t = 0, value_name = "MB")]
+    pub split_mb: u64,
+    /// Time of the sensor before the recording continues in the next file, s; 0: any.
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
+    pub split_s: f64,
+    /// Continue with the next part of the recording if there is one (as `gyre run` starts it).
+    #[arg(long, hide = true)]
+    pub continues: bool,
+}
+
+/// Parses the name of a recording. Readers recognise the format by the ending.
+pub fn recording(text: &str) -> Result<PathBuf, String> {
+    match text.strip_suffix(".mcap") {
+        Some(name) if !name.is_empty() && !name.ends_with('/') => Ok(text.into()),
+        _ => Err("the name of a recording ends in .mcap".to_owned()),
+    }
+}
 
 pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
-    let span = seconds("--split-s", arguments.split.split_s)?;
+    let bytes = arguments.split_mb.saturating_mul(1_000_000);
+    let span_ns = seconds("--split-s", arguments.split_s)?.as_nanos();
+    let span_ns = i64::try_from(span_ns).unwrap_or(i64::MAX);
     let options = Options {
         out: arguments.run.folder()?,
         to: arguments.to.clone(),
         topics: arguments.topics.clone(),
-        split: split(&arguments.split, span),
+        split: Split {
+            bytes: (bytes > 0).then_some(bytes),
+            span_ns: (span_ns > 0).then_some(span_ns),
+        },
         continues: arguments.continues,
     };
     Ok(match gyre_recorder::record(&options) {
@@ -30,12 +65,4 @@ pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
             ExitCode::from(error.exit_code())
         }
     })
-}
-
-fn split(arguments: &SplitArguments, span: Duration) -> Split {
-    let span_ns = i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);
-    Split {
-        bytes: (arguments.split_mb > 0).then_some(arguments.split_mb.saturating_mul(1_000_000)),
-        span_ns: (span_ns > 0).then_some(span_ns),
-    }
 }

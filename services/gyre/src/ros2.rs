@@ -1,11 +1,82 @@
-//! ROS 2: `gyre ros2`, and a radar behind Navtech's driver as a source. A build without the feature
-//! `ros2` refuses both.
+//! ROS 2: `gyre ros2`, and a radar behind Navtech's driver as a source.
 
-#[cfg(feature = "ros2")]
-#[path = "ros2/present.rs"]
-mod build;
-#[cfg(not(feature = "ros2"))]
-#[path = "ros2/absent.rs"]
-mod build;
+use std::{path::Path, process::ExitCode};
 
-pub use build::{ask, may_come, publish, receive};
+use gyre_configuration::Configuration;
+use gyre_datasets::DatasetOptions;
+use gyre_results::{absolute, map_options};
+use gyre_ros2_bridge::{
+    Bridge, MapSettings, Settings,
+    source::{self, AskError},
+};
+use gyre_ros2_messages::Domain;
+use gyre_run::SourceConfig;
+use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
+use gyre_stages::live_radar::Sizes;
+use gyre_terminal::{Failure, print};
+
+use crate::cli::Ros2Arguments;
+
+pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
+    // A wrong folder is reported at once.
+    let run = arguments.run.folder()?;
+    if !arguments.wait {
+        ObservedRun::writing_to(&run)?;
+    }
+    let domain = Domain::new(arguments.domain, arguments.interface.as_deref())?;
+    let bridge = Bridge::open(Settings {
+        out: absolute(&run)?,
+        domain,
+        namespace: arguments.namespace.clone(),
+        frames: arguments.frames.frames.clone(),
+        mounting: arguments.frames.mounting.parse()?,
+        transforms: !arguments.no_tf,
+        map: (!arguments.no_map).then_some(map_settings),
+    })?;
+    let out = run.display();
+    print::note(format_args!(
+        "gyre: {out} is published in domain {} of ROS 2",
+        domain.id()
+    ));
+    if domain.is_open() {
+        print::note(
+            "gyre: whoever is on this network can read it, and DDS carries it unencrypted; --interface 127.0.0.1 keeps it on this computer",
+        );
+    }
+    let signals = Signals::install()?;
+    bridge.publish(&signals, |sentence| {
+        print::note(format_args!("gyre: {sentence}"));
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn map_settings(out: &Path) -> Result<MapSettings, String> {
+    let configuration = Configuration::read(&out.join("config.toml"), &[]);
+    let configuration = configuration.map_err(|error| error.to_string())?;
+    let estimator = configuration.slam.kind.estimator();
+    Ok(MapSettings {
+        options: map_options(&configuration),
+        estimator: estimator.ok_or("slam.kind is none")?,
+    })
+}
+
+pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Failure> {
+    let settings = source::Settings::of(source, options)?;
+    source::ask(&settings).map_err(|error: AskError| error.into())
+}
+
+/// Returns whether a driver that was asked in vain may still come.
+pub fn may_come(error: &Failure) -> bool {
+    let absent = error.downcast_ref::<AskError>();
+    absent.is_some_and(|it| it.may_pass)
+}
+
+pub fn receive(
+    launch: &Launch,
+    source: &SourceConfig,
+    options: &DatasetOptions,
+) -> Result<StageCounters, StageError> {
+    let settings = source::Settings::of(source, options);
+    let settings = settings.map_err(|error| StageError::Input(error.to_string()))?;
+    source::run(launch, settings)
+}

@@ -137,10 +137,8 @@ fn make_ready(
         checked.scans.count,
         checked.scans.recording.as_ref().map(|it| &it.fingerprint),
     )?;
-    if let Some((begun_with, holds)) = earlier.identity() {
-        begun_with.require_recording(&identity, out.path(), holds)?;
-    }
-    let recording_goes_on = earlier.recording_goes_on(&identity, out);
+    earlier.require_recording(&identity, out)?;
+    let recording_goes_on = earlier.recording_goes_on(&identity);
     plan::require_recordable(&configuration.record, out.path(), recording_goes_on)?;
     if let Some(begun) = unfinished.filter(|begun| begun.lost > 0) {
         print::note(format_args!(

@@ -1,22 +1,54 @@
 //! `gyre simulate`: writes a simulated recording.
 
-use std::{io::IsTerminal, num::NonZeroUsize, path::Path, process::ExitCode, time::Instant};
+use std::{
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::Instant,
+};
 
-use gyre_configuration::{Configuration, strict::path_value};
+use clap::Args;
+use gyre_configuration::strict::path_value;
 use gyre_results::Content;
-use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset};
-use gyre_terminal::{Failure, print};
-use indicatif::{ProgressBar, ProgressStyle};
+use gyre_simulator::{
+    OutputFormat, SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset,
+};
+use gyre_terminal::{Failure, inputs::configuration, print};
+use gyre_tools::bar::Bar;
 
-use crate::cli::SimulateArguments;
+#[derive(Debug, Args)]
+pub struct SimulateArguments {
+    /// The configuration, a TOML file or a name that `gyre config` lists: its section
+    /// `[simulation]` is used. Default: the defaults of that section.
+    pub configuration: Option<PathBuf>,
+    /// The folder of the recording. The files of an earlier call with the same configuration are
+    /// kept and completed.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Number of scans (simulation.scans).
+    #[arg(long)]
+    pub scans: Option<usize>,
+    /// Drive along this file: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv.
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// Seed (simulation.seed).
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// The format of the files: oxford, boreas or radiate (simulation.output.format).
+    #[arg(long)]
+    pub format: Option<OutputFormat>,
+    /// Threads to render on. Default: all processors. The files are the same whatever their number.
+    #[arg(long)]
+    pub threads: Option<NonZeroUsize>,
+    /// Override a key, as in simulation.drive.speed_mps=5; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
 
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;
-    let configuration = match &arguments.configuration {
-        Some(named) => gyre_terminal::inputs::configuration(named, &overrides)?,
-        None => Configuration::of_overrides(&overrides)?,
-    };
+    let configuration = configuration(arguments.configuration.as_deref(), &overrides)?;
     let started = Instant::now();
     let summary = write(
         arguments.threads,
@@ -78,24 +110,11 @@ fn write(
     simulation: &SimulationConfig,
     out: &Path,
 ) -> Result<Summary, SimulatorError> {
-    let bar = match std::io::stderr().is_terminal() {
-        true => ProgressBar::new(0),
-        false => ProgressBar::hidden(),
-    };
-    if let Ok(style) = ProgressStyle::with_template(
-        "simulating {wide_bar} {pos}/{len} scans, {per_sec}, {eta} left",
-    ) {
-        bar.set_style(style);
-    }
+    let mut bar = None;
     let summary = write_dataset(simulation, out, threads, &mut |done, total| {
-        if bar.length() != Some(total as u64) {
-            bar.set_length(total as u64);
-            // Existing scans do not count for the rate.
-            bar.set_position(done as u64);
-            bar.reset_eta();
-        }
-        bar.set_position(done as u64);
+        let bar = bar.get_or_insert_with(|| Bar::new(Some(total)));
+        bar.scans(done as u64, done as u64, "simulated".to_owned());
     });
-    bar.finish_and_clear();
+    bar.iter().for_each(Bar::finish);
     summary
 }

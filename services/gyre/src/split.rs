@@ -7,19 +7,13 @@ use gyre_link::ONE_THREAD;
 use gyre_run::LinkConfig;
 use gyre_terminal::{Failure, execute_again};
 
-#[cfg(feature = "link")]
-pub use gyre_link::{run_base, run_robot};
-
-#[cfg(not(feature = "link"))]
-pub use absent::{run_base, run_robot};
-
 /// Checks that the other side of a split run can be reached as it is configured.
 pub fn check(configuration: &Configuration) -> Result<(), Failure> {
     if configuration.link.side.is_none() {
         return Ok(());
     }
     #[cfg(not(feature = "link"))]
-    return Err(crate::features::absent(absent::PART).into());
+    return Err(crate::features::absent(crate::features::LINK).into());
     #[cfg(feature = "link")]
     gyre_link::check(&configuration.link).map_err(|error| format!("[link]: {error}").into())
 }
@@ -46,30 +40,5 @@ pub fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
             Ok(gyre_link::ask_robot(link)?)
         }
         _ => Ok(0),
-    }
-}
-
-/// Takes the place of the link in a build without it.
-#[cfg(not(feature = "link"))]
-pub mod absent {
-    use std::process::ExitCode;
-
-    use gyre_stage::{Launch, StageCounters, StageError};
-    use gyre_terminal::Failure;
-
-    use crate::{cli::LinkEnd, features};
-
-    pub(super) const PART: &str = "zenoh, which links machines";
-
-    pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(StageError::Input(features::absent(PART)))
-    }
-
-    pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(StageError::Input(features::absent(PART)))
-    }
-
-    pub fn link(_: &LinkEnd) -> Result<ExitCode, Failure> {
-        Err(features::absent(PART).into())
     }
 }

@@ -10,7 +10,7 @@ use std::{
 use gyre_configuration::{process_names, simulated_samples};
 use gyre_datasets::DatasetOptions;
 use gyre_messages::{FollowerId, StageId};
-use gyre_run::{LinkConfig, Side, SourceConfig, SourceKind, StageConfig};
+use gyre_run::{SourceConfig, SourceKind, StageConfig};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
 use gyre_stages::live_radar::Settings;
@@ -22,7 +22,7 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::{program, ros2, split};
+use crate::program;
 
 type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, StageError>>;
 
@@ -103,16 +103,25 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
 
 /// Integrates motions to poses, or leaves that to the other side of a link.
 fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
-    match launch.section::<LinkConfig>("link")?.side {
-        Some(Side::Robot) => split::run_robot(launch),
-        _ => gyre_stages::pose_integration::run(launch),
+    #[cfg(feature = "link")]
+    if is_side(launch, gyre_run::Side::Robot)? {
+        return gyre_link::run_robot(launch);
     }
+    gyre_stages::pose_integration::run(launch)
+}
+
+/// A build without the feature refuses to begin a split run.
+#[cfg(feature = "link")]
+fn is_side(launch: &Launch, side: gyre_run::Side) -> Result<bool, StageError> {
+    let link: gyre_run::LinkConfig = launch.section("link")?;
+    Ok(link.side == Some(side))
 }
 
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
-    if launch.section::<LinkConfig>("link")?.side == Some(Side::Base) {
-        return split::run_base(launch);
+    #[cfg(feature = "link")]
+    if is_side(launch, gyre_run::Side::Base)? {
+        return gyre_link::run_base(launch);
     }
     let source: SourceConfig = launch.section("source")?;
     match source.kind {
@@ -120,8 +129,12 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
             let settings = Settings::of(&source, &launch.section("dataset")?);
             return gyre_stages::live_radar::run(launch, settings.map_err(|error| input(&error))?);
         }
-        SourceKind::Ros2 => return ros2::receive(launch, &source, &launch.section("dataset")?),
-        SourceKind::Recording => {}
+        #[cfg(feature = "ros2")]
+        SourceKind::Ros2 => {
+            return crate::ros2::receive(launch, &source, &launch.section("dataset")?);
+        }
+        // A build without ROS 2 refuses to begin a run from there.
+        _ => {}
     }
     let simulation = match launch.has_section("simulation") {
         true => Some(launch.section::<SimulationConfig>("simulation")?),

@@ -1,13 +1,36 @@
 //! `gyre watch`: shows a running run in a browser, and to Prometheus and Foxglove.
 
-use std::{net::SocketAddr, process::ExitCode};
+use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 
+use clap::Args;
 use gyre_results::absolute;
 use gyre_stage::{observer::ObservedRun, wake::Signals};
 use gyre_terminal::{Failure, print};
+use gyre_tools::operate::RunChoice;
 use gyre_watch::{Endpoint, Server, Token};
 
-use crate::{cli::WatchArguments, earlier};
+use crate::earlier;
+
+#[derive(Debug, Args)]
+pub struct WatchArguments {
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// The address to serve at. Any but the loopback's needs the token of the address that is
+    /// printed.
+    #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS")]
+    pub listen: SocketAddr,
+    /// Serve Foxglove and Lichtblick too, at this address by their WebSocket protocol. Any but the
+    /// loopback's needs the token.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    pub foxglove: Option<SocketAddr>,
+    /// The file of the token, which is written with a random one if it is missing. Default: another
+    /// token at each start.
+    #[arg(long, value_name = "FILE")]
+    pub token_file: Option<PathBuf>,
+    /// Wait for a run that has not started yet.
+    #[arg(long)]
+    pub wait: bool,
+}
 
 /// Serves the page until a signal arrives. From another machine it is read with a token alone.
 pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {

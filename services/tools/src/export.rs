@@ -21,7 +21,7 @@ use gyre_ros2_messages::{
 };
 use gyre_terminal::{Failure, print};
 
-pub use arguments::{DatasetForm, ExportArguments, FrameArguments, ScanForm};
+pub use arguments::{ExportArguments, FrameArguments, ScanForm};
 use scans::ScanWriter;
 use source::{Place, Source};
 
@@ -44,20 +44,27 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
     let mut trajectory = places.peek().map(begin).transpose()?;
     let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, &frames.radar)?;
     let mut last_ns = 0;
-    let mut next = |bag: &mut BagWriter| match &mut scans {
-        Some(scans) => scans.write_next(bag),
-        None => Ok(None),
-    };
-    while let Some(stamp_ns) = next(&mut bag)? {
-        while let Some(place) = places.next_if(|place| is_due(place, stamp_ns)) {
-            write_place(&mut bag, trajectory.as_mut(), place?)?;
+    loop {
+        let scan_ns = match &mut scans {
+            Some(scans) => scans.write_next(&mut bag)?,
+            None => None,
+        };
+        // After the last scan all the rest is due; what cannot be read is due at once.
+        let is_due = |place: &Result<Place, Failure>| match (place, scan_ns) {
+            (Ok(place), Some(scan_ns)) => place.stamp_ns <= scan_ns,
+            _ => true,
+        };
+        while let Some(place) = places.next_if(is_due) {
+            let place = place?;
+            last_ns = last_ns.max(place.stamp_ns);
+            if let Some(trajectory) = &mut trajectory {
+                trajectory.write(&mut bag, &place)?;
+            }
         }
-        last_ns = stamp_ns;
-    }
-    for place in places {
-        let place = place?;
-        last_ns = last_ns.max(place.stamp_ns);
-        write_place(&mut bag, trajectory.as_mut(), place)?;
+        match scan_ns {
+            Some(scan_ns) => last_ns = last_ns.max(scan_ns),
+            None => break,
+        }
     }
     source.write_map(&mut bag, &frames, last_ns, &mounting)?;
     let counts = bag
@@ -72,11 +79,6 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
     print::line(format_args!("{}: {}", path.display(), counts.join(", ")))?;
     scans.iter().for_each(ScanWriter::describe_losses);
     Ok(())
-}
-
-/// Returns whether a pose is not later than a scan; what cannot be read is due at once.
-fn is_due(place: &Result<Place, Failure>, stamp_ns: i64) -> bool {
-    place.as_ref().is_ok_and(|place| place.stamp_ns <= stamp_ns) || place.is_err()
 }
 
 struct Trajectory {
@@ -159,12 +161,4 @@ impl Trajectory {
         bag.write(markers, stamp_ns, &drawn)?;
         Ok(())
     }
-}
-
-fn write_place(
-    bag: &mut BagWriter,
-    trajectory: Option<&mut Trajectory>,
-    place: Place,
-) -> Result<(), Failure> {
-    trajectory.map_or(Ok(()), |trajectory| trajectory.write(bag, &place))
 }

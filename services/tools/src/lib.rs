@@ -1,5 +1,6 @@
 //! Tools that are started by hand, a module for each.
 
+pub mod bar;
 pub mod batch;
 pub mod conformance;
 pub mod doctor;

@@ -5,10 +5,10 @@ mod inspection;
 mod inspector;
 pub mod picture;
 
-use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::describe_masks_in_process;
+use gyre_configuration::describe_masks;
 use gyre_results::Content;
 use gyre_terminal::{Failure, inputs::Inputs, print};
 
@@ -47,13 +47,10 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         &configuration.data(),
     )?;
     let mut inspector = MaskInspector::new(&configuration, played)?;
-    describe_masks_in_process(&configuration)?
-        .iter()
-        .for_each(print::note);
+    describe_masks(&configuration)?.iter().for_each(print::note);
     let out = &arguments.out;
     Content::MASKS.require_place(out)?;
-    fs::create_dir_all(out)
-        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    gyre_storage::create_folder(out)?;
     if !arguments.json {
         print::line(inspection::HEADER)?;
     }

@@ -1,13 +1,13 @@
 //! `gyre new`: begins a project.
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     process::ExitCode,
 };
 
 use clap::{Args, Subcommand, builder::PossibleValuesParser};
 use gyre_run::StageConfig;
+use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
 
 /// A kind of project.
@@ -54,7 +54,9 @@ pub fn new(what: &New) -> Result<ExitCode, Failure> {
                 .replace("@function@", function)
                 .replace("@gyre@", &checkout.display().to_string())
         };
-        write(&folder.join(fill_in(name)), &fill_in(text))?;
+        let path = folder.join(fill_in(name));
+        storage::create_folder(path.parent().unwrap_or(&folder))?;
+        storage::write(&path, fill_in(text))?;
     }
     let folder = folder.display();
     print::line(format_args!(
@@ -101,11 +103,4 @@ fn checkout(folder: &Path) -> Result<PathBuf, Failure> {
         Ok(folder) if is_one => Ok(folder),
         _ => Err(format!("{} is no checkout of Gyre", folder.display()).into()),
     }
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let folder = path.parent().unwrap_or(path);
-    fs::create_dir_all(folder)
-        .and_then(|()| fs::write(path, text))
-        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
 }

@@ -10,6 +10,7 @@ use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, inputs::Inputs, print};
 
 pub use arguments::RadarServerArguments;
+pub(crate) use server::configuration;
 
 /// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
 pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
@@ -41,9 +42,7 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
 /// configuration nothing is measured in it.
 fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
     let given = inputs.given_recording()?;
-    let configuration = match &given.configuration {
-        Some(named) => gyre_terminal::inputs::configuration(named, &inputs.set)?,
-        None => Configuration::of_overrides(&inputs.set)?,
-    };
+    let named = given.configuration.as_deref();
+    let configuration = gyre_terminal::inputs::configuration(named, &inputs.set)?;
     Ok(configuration.streaming(given.data.as_deref()))
 }

@@ -113,15 +113,11 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
 
 fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
     let name = match format {
-        Format::Oxford => "oxford",
-        Format::Boreas => "boreas",
-        Format::BoreasRt => "boreas-rt",
-        Format::Mulran | Format::MulranOxfordForm => "mulran",
-        Format::Radiate => "radiate",
-        Format::Fomo => "fomo",
         Format::Oord | Format::Mcap | Format::Other | Format::Ros2Bag => {
             return Ok(DatasetOptions::default());
         }
+        Format::MulranOxfordForm => Format::Mulran.name(),
+        format => format.name(),
     };
     let mut table = Named::read_in(Path::new(name), None)?.table;
     strict::section(&mut table, "dataset")

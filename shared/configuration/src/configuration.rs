@@ -3,7 +3,6 @@
 
 pub mod difference;
 mod validation;
-mod without_effect;
 
 use std::{
     collections::BTreeMap,
@@ -27,8 +26,8 @@ use gyre_slam::SlamConfig;
 use serde::Serialize;
 
 use crate::{
+    ConfigurationError,
     automatic::{AutomaticError, automatic},
-    error::ConfigurationError,
     method::MethodConfig,
     paths::{self, Named},
     strict,

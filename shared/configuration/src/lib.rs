@@ -6,7 +6,6 @@ mod automatic;
 pub mod calibration;
 #[cfg(feature = "run")]
 mod configuration;
-mod error;
 #[cfg(feature = "run")]
 mod masks;
 mod method;
@@ -20,9 +19,12 @@ pub mod strict;
 pub use automatic::{Automatic, AutomaticError, automatic, radar_constants};
 #[cfg(feature = "run")]
 pub use configuration::{Configuration, difference, process_names};
-pub use error::ConfigurationError;
 #[cfg(feature = "run")]
-pub use masks::{describe_masks, describe_masks_in_process, describe_objects};
+pub use masks::{describe_masks, describe_objects};
 pub use method::MethodConfig;
 #[cfg(feature = "run")]
 pub use scans::{Played, fingerprint, gnss_log, open, simulated_samples, with_stored_options};
+
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct ConfigurationError(pub String);

@@ -1,7 +1,7 @@
 //! The paths of a configuration: relative to it, or files of the program.
 
 use std::{
-    env, fs,
+    env,
     path::{Path, PathBuf},
 };
 
@@ -30,11 +30,10 @@ const RECORDING: &str = "record.file";
 #[derive(Clone, Debug)]
 pub struct Named {
     pub table: Table,
-    notes: Notes,
+    /// Keys, and sentences about paths in the current folder, for as long as no others take their
+    /// places.
+    notes: Vec<(String, String)>,
 }
-
-/// Keys, and sentences about their paths, for as long as no others take their places.
-type Notes = Vec<(String, String)>;
 
 impl Named {
     /// Reads the configuration of this path, or of this name in the program. A relative path in it
@@ -55,14 +54,30 @@ impl Named {
             Some(_) => named.to_owned(),
             None => std::path::absolute(named).unwrap_or_else(|_| named.to_owned()),
         };
-        let mut places = Places {
-            folder: file.parent().filter(|_| own.is_none()),
-            file: named,
-            here,
-            notes: Vec::new(),
-        };
-        visit(&mut table, |path, key| places.replace(path, key))?;
-        let notes = places.notes;
+        let folder = file.parent().filter(|_| own.is_none());
+        let mut notes = Vec::new();
+        visit(&mut table, |path, key| {
+            let written = Path::new(path.as_str());
+            if path.is_empty() || written.is_absolute() || gyre_shipped::is_own(written) {
+                return Ok(());
+            }
+            let beside = folder.map(|folder| folder.join(written));
+            let is_beside = |path: &PathBuf| key == RECORDING || path.exists();
+            let own = || gyre_shipped::find(written);
+            let found = beside.clone().filter(is_beside).or_else(own);
+            let here = here.as_deref().map(|here| here.join(written));
+            match (found, here.filter(|here| here.exists())) {
+                (None, Some(here)) => {
+                    let sentence = format!(
+                        "{key}: {path} is taken from the current folder, as it is not beside {}, where the paths of a configuration start",
+                        named.display()
+                    );
+                    notes.push((key.to_owned(), sentence));
+                    put(path, here)
+                }
+                (found, _) => found.or(beside).map_or(Ok(()), |found| put(path, found)),
+            }
+        })?;
         Ok(Self { table, notes })
     }
 
@@ -106,15 +121,8 @@ fn visit(
     mut each: impl FnMut(&mut String, &str) -> Result<(), ConfigurationError>,
 ) -> Result<(), ConfigurationError> {
     for key in KEYS {
-        let paths = match value_mut(table, key) {
-            Some(Value::Array(paths)) => paths.as_mut_slice(),
-            Some(path) => std::slice::from_mut(path),
-            None => continue,
-        };
-        for path in paths {
-            if let Value::String(path) = path {
-                each(path, key)?;
-            }
+        if let Some(Value::String(path)) = value_mut(table, key) {
+            each(path, key)?;
         }
     }
     let Some(Value::Table(stages)) = table.get_mut("stages") else {
@@ -168,62 +176,6 @@ fn is_name(named: &Path) -> bool {
     named.extension().is_none() && named.file_name() == Some(named.as_os_str())
 }
 
-struct Places<'a> {
-    file: &'a Path,
-    folder: Option<&'a Path>,
-    here: Option<PathBuf>,
-    notes: Notes,
-}
-
-impl Places<'_> {
-    fn replace(&mut self, path: &mut String, key: &str) -> Result<(), ConfigurationError> {
-        let written = Path::new(path.as_str());
-        if path.is_empty() || written.is_absolute() || gyre_shipped::is_own(written) {
-            return Ok(());
-        }
-        let beside = self.folder.map(|folder| folder.join(written));
-        let is_beside = |path: &PathBuf| key == RECORDING || path.exists();
-        let own = gyre_shipped::find(written);
-        let here = self.here.as_deref().map(|here| here.join(written));
-        let here = here.filter(|here| here.exists());
-        let (found, sentence) = match (beside.clone().filter(is_beside), own, here) {
-            (Some(beside), ..) => (Some(beside), None),
-            (None, Some(own), here) => {
-                let sentence = here.filter(|here| differs(&own, here)).map(|here| {
-                    let here = here.display();
-                    format!("{key}: {path} is that of the program, and {here} differs: to use that, name it by its whole path")
-                });
-                (Some(own), sentence)
-            }
-            (None, None, Some(here)) => {
-                let sentence = format!(
-                    "{key}: {path} is taken from the current folder, as it is not beside {}, where the paths of a configuration start",
-                    self.file.display()
-                );
-                (Some(here), Some(sentence))
-            }
-            (None, None, None) => {
-                let sentence = format!(
-                    "{key}: there is no {path} beside {}, in the program or in the current folder",
-                    self.file.display()
-                );
-                (beside, Some(sentence))
-            }
-        };
-        if let Some(found) = found {
-            put(path, found)?;
-        }
-        let key = key.to_owned();
-        self.notes.extend(sentence.map(|sentence| (key, sentence)));
-        Ok(())
-    }
-}
-
-fn differs(own: &Path, file: &Path) -> bool {
-    let own = gyre_shipped::bytes(own);
-    own.is_some_and(|own| fs::read(file).is_ok_and(|bytes| bytes != own))
-}
-
 fn value<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let (first, rest) = key.split_once('.')?;
     let mut parts = rest.split('.');
@@ -239,6 +191,8 @@ fn value_mut<'a>(table: &'a mut Table, key: &str) -> Option<&'a mut Value> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::fs;
+
     use super::*;
 
     /// A folder with a configuration in `robot/` and the current folder `here/`.
@@ -272,15 +226,11 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_the_program_is_found_from_any_folder_and_another_one_here_is_named() {
+    fn a_file_of_the_program_goes_before_one_in_the_current_folder() {
         let own = Path::new("gyre:models/gyre-255.toml");
-        let (_folder, named) = read(&[], MODEL);
-        assert_eq!(at(&named, "masking.model"), own);
-        assert!(named.notes(&named.table).is_empty());
         let (_folder, named) = read(&["here/models/gyre-255.toml"], MODEL);
         assert_eq!(at(&named, "masking.model"), own);
-        let note = &named.notes(&named.table)[0];
-        assert!(note.contains("is that of the program, and"), "{note}");
+        assert!(named.notes(&named.table).is_empty());
     }
 
     #[test]
@@ -296,15 +246,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_nowhere_is_said_to_be_missing_beside_the_configuration() {
+    fn what_is_nowhere_is_beside_the_configuration() {
         let (folder, named) = read(&[], "[slam]\nmap = 'town.map'\n");
         assert_eq!(at(&named, "slam.map"), folder.path().join("robot/town.map"));
-        let note = &named.notes(&named.table)[0];
-        let expected = format!(
-            "no town.map beside {}/robot/run.toml",
-            folder.path().display()
-        );
-        assert!(note.contains(&expected), "{note}");
     }
 
     #[test]

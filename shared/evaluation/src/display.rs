@@ -104,15 +104,12 @@ impl fmt::Display for Coverage {
                 matched,
                 estimate_surplus,
                 truth_surplus,
-            } => {
-                let all = matched + estimate_surplus;
-                write!(f, "by index: {matched} of {all} estimated poses")?;
-                match (estimate_surplus, truth_surplus) {
-                    (0, 0) => write!(f, ", as many as the ground truth has"),
-                    (0, cut) => write!(f, "; left out: the last {cut} of the ground truth"),
-                    (cut, _) => write!(f, "; left out: the last {cut} of the estimate"),
-                }
-            }
+            } => write!(
+                f,
+                "by index: {matched} of {} estimated poses; left out: {estimate_surplus} at its end, \
+                 {truth_surplus} at the end of the ground truth",
+                matched + estimate_surplus
+            ),
         }
     }
 }

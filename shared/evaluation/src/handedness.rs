@@ -55,14 +55,6 @@ pub enum HeadingFault {
     Unclear,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Sign {
-    AsGiven,
-    Negated,
-    /// Neither: a straight path equals its mirror image.
-    Open,
-}
-
 /// A sign is clear if its misfit is below this share of the other's...
 const CLEAR_SHARE: f64 = 0.5;
 /// ...and the other's misfit is more than rounding: for positions, m.
@@ -105,23 +97,23 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
     (matched.map_estimate(change), axes)
 }
 
-fn decide(y: Sign, heading: Sign, mirror_no_worse: bool) -> (bool, bool) {
-    use Sign::{AsGiven, Negated, Open};
+fn decide(y: Option<bool>, heading: Option<bool>, mirror_no_worse: bool) -> (bool, bool) {
     match (y, heading) {
-        (Open, Open | AsGiven) => (false, false),
-        (Open, Negated) => (mirror_no_worse, true),
-        (y, Open) => (y == Negated, y == Negated),
-        (y, heading) => (y == Negated, heading == Negated),
+        (None, None | Some(false)) => (false, false),
+        (None, Some(true)) => (mirror_no_worse, true),
+        (Some(y), heading) => (y, heading.unwrap_or(y)),
     }
 }
 
-fn sense(given: f64, negated: f64, min_misfit: f64) -> Sign {
+/// Returns whether a sign is negated; `None` if neither is clear: a straight path equals its mirror
+/// image.
+fn sense(given: f64, negated: f64, min_misfit: f64) -> Option<bool> {
     if negated < CLEAR_SHARE * given && given > min_misfit {
-        Sign::Negated
+        Some(true)
     } else if given < CLEAR_SHARE * negated && negated > min_misfit {
-        Sign::AsGiven
+        Some(false)
     } else {
-        Sign::Open
+        None
     }
 }
 
@@ -270,8 +262,8 @@ mod tests {
     #[test]
     fn a_poor_estimate_is_not_mirrored_for_a_small_gain() {
         let y = sense(20.0, 15.0, 0.01);
-        assert_eq!(decide(y, Sign::AsGiven, true), (false, false));
-        assert_eq!(decide(y, Sign::Negated, true), (true, true));
+        assert_eq!(decide(y, Some(false), true), (false, false));
+        assert_eq!(decide(y, Some(true), true), (true, true));
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub use handedness::{Axes, HeadingFault};
 pub use kitti::{Kitti, kitti};
 pub use loops::{LoopErrors, loop_errors};
 pub use matched::{MatchedPoses, path_m};
-pub use motions::{MatchedMotions, Part, TimedMotion};
+pub use motions::{MatchedMotions, TimedMotion, part};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
 pub use objects::{
     Hota, ObjectBand, ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors,

@@ -1,5 +1,7 @@
 //! Association of reported motions with the ground truth at their stamps.
 
+use std::ops::Range;
+
 use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, UncertainMotion, xy_yaw};
 
 use crate::{
@@ -16,39 +18,23 @@ pub struct TimedMotion {
     pub estimate: OdometryMotion,
 }
 
-/// A part of a drive, by shares of its duration. Covariances are calibrated on one part and tested
-/// on another.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Part {
-    from: f64,
-    to: f64,
-}
-
-impl Part {
-    pub const ALL: Self = Self { from: 0.0, to: 1.0 };
-
-    /// The part from one share of the duration to another; `None` unless 0 <= `from` < `to` <= 1.
-    pub fn new(from: f64, to: f64) -> Option<Self> {
-        (0.0 <= from && from < to && to <= 1.0).then_some(Self { from, to })
-    }
-
-    /// Returns the motions that start within this part; `motions` are in order of time. Adjoining
-    /// parts share no motion and leave none out.
-    pub fn of<'m>(&self, motions: &'m [TimedMotion]) -> &'m [TimedMotion] {
-        let (Some(first), Some(last)) = (motions.first(), motions.last()) else {
-            return motions;
-        };
-        let duration_ns = last.to_ns.saturating_sub(first.from_ns) as f64;
-        let before = |share: f64| {
-            motions.partition_point(|motion| {
-                (motion.from_ns.saturating_sub(first.from_ns) as f64) < share * duration_ns
-            })
-        };
-        // Motions out of order have no parts: `MatchedMotions::new` refuses them.
-        motions
-            .get(before(self.from)..before(self.to))
-            .unwrap_or(motions)
-    }
+/// Returns the motions that start within a part of the drive, by shares of its duration; `motions`
+/// are in order of time. Adjoining parts share no motion and leave none out. Covariances are
+/// calibrated on one part and tested on another.
+pub fn part<'m>(motions: &'m [TimedMotion], shares: &Range<f64>) -> &'m [TimedMotion] {
+    let (Some(first), Some(last)) = (motions.first(), motions.last()) else {
+        return motions;
+    };
+    let duration_ns = last.to_ns.saturating_sub(first.from_ns) as f64;
+    let before = |share: f64| {
+        motions.partition_point(|motion| {
+            (motion.from_ns.saturating_sub(first.from_ns) as f64) < share * duration_ns
+        })
+    };
+    // Motions out of order have no parts: `MatchedMotions::new` refuses them.
+    motions
+        .get(before(shares.start)..before(shares.end))
+        .unwrap_or(motions)
 }
 
 /// Motions in unbroken chains, with the ground truth at their stamps.
@@ -241,14 +227,10 @@ mod tests {
     #[test]
     fn adjoining_parts_share_no_motion_and_leave_none_out() {
         let motions = [0, 10, 20, 30, 45].map(|t| motion(t, t + 10, 1.0));
-        let of = |from, to| Part::new(from, to).unwrap().of(&motions);
+        let of = |from, to| part(&motions, &(from..to));
         assert_eq!((of(0.0, 0.5), of(0.5, 1.0)), motions.split_at(3));
-        assert_eq!(Part::ALL.of(&motions), motions);
+        assert_eq!(of(0.0, 1.0), motions);
         assert!(of(0.4, 0.5).is_empty());
-        for (from, to) in [(0.5, 0.5), (0.6, 0.5), (-0.1, 0.5), (0.0, 1.1)] {
-            assert_eq!(Part::new(from, to), None);
-        }
-        assert_eq!(Part::new(f64::NAN, 1.0), None);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! matches one that is there but not required, as a pedestrian, counts neither for nor against.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
+use std::{fmt, ops::Range};
 
 use gyre_objects::assign;
 use nalgebra::{Matrix2, Point2, Vector2};
@@ -18,7 +18,7 @@ mod hota;
 pub use bands::ObjectBand;
 pub use hota::Hota;
 
-use bands::{ALL, Band, RANGES_M, SPEEDS_MPS, Sums};
+use bands::{ALL, RANGES_M, SPEEDS_MPS, Sums};
 use hota::Compared;
 
 /// A true object at the time of a scan, in the frame of the sensor.
@@ -250,8 +250,8 @@ impl Count {
     }
 
     fn sums_of(&mut self, range_m: f64, speed_mps: Option<f64>) -> impl Iterator<Item = &mut Sums> {
-        let by_range = RANGES_M.iter().position(|band| band.contains(range_m));
-        let speed_of = |mps| SPEEDS_MPS.iter().position(|band| band.contains(mps));
+        let by_range = RANGES_M.iter().position(|band| band.contains(&range_m));
+        let speed_of = |mps: f64| SPEEDS_MPS.iter().position(|band| band.contains(&mps));
         let by_speed = speed_mps.and_then(speed_of);
         std::iter::once(&mut self.all)
             .chain(by_range.map(|band| &mut self.by_range[band]))
@@ -263,7 +263,7 @@ impl Count {
         let (required, matched) = (sums.required, sums.matched);
         let false_positives = sums.false_positives;
         let wrong = required - matched + false_positives + self.switches;
-        let by = |bands: &[Band], sums: &[Sums]| -> Vec<ObjectBand> {
+        let by = |bands: &[Range<f64>], sums: &[Sums]| -> Vec<ObjectBand> {
             let both = bands.iter().zip(sums);
             both.map(|(band, sums)| sums.in_band(band)).collect()
         };

@@ -10,7 +10,7 @@ use std::{
 
 use gyre_configuration::Configuration;
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, TimedMotion, TruthSigma};
+use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, TimedMotion, TruthSigma, part};
 use gyre_radar::Trajectory;
 use gyre_terminal::{Failure, print};
 
@@ -22,6 +22,7 @@ use crate::{
 };
 
 pub use arguments::EvaluateArguments;
+pub use objects::rows;
 
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if arguments.objects {
@@ -107,8 +108,9 @@ fn judged_motions(
     truth: &Trajectory,
     evaluation: &Evaluation,
 ) -> Result<Option<MatchedMotions>, Failure> {
-    let judge =
-        |motions: &[TimedMotion]| judge_motions(arguments.nees_part.of(motions), truth, evaluation);
+    let judge = |motions: &[TimedMotion]| {
+        judge_motions(part(motions, &arguments.nees_part), truth, evaluation)
+    };
     if let Some(path) = &arguments.odometry {
         return judge(&odometry::read(path)?).map(Some);
     }

@@ -34,15 +34,6 @@ pub struct Identity {
     pub configuration: toml::Table,
 }
 
-/// The state of the run in a folder, which an [`Identity`] is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Holds {
-    /// An unfinished run with so many poses, which is resumed.
-    Unfinished(u64),
-    /// The results of a complete run, which the same run may replace by the same.
-    Complete,
-}
-
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Programs {
@@ -103,21 +94,14 @@ impl Identity {
         Ok(storage::write(&out.join(BEGUN_WITH), text)?)
     }
 
-    pub fn read(out: &Out, holds: Holds) -> Result<Self, Failure> {
+    pub fn read(out: &Out) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
             let path = path.display();
-            match holds {
-                Holds::Unfinished(poses) => format!(
-                    "{path} {state}: it says what the {poses} poses in the journal beside it were computed from, so the run cannot be \
-                     resumed without it; restore it from a backup, or choose another --out (--fresh would discard the poses)"
-                ),
-                Holds::Complete => format!(
-                    "{path} {state}: it says what the results of the complete run in {} were computed from; restore it from a backup, \
-                     choose another --out, or replace the results with --fresh",
-                    out.path().display()
-                ),
-            }
+            format!(
+                "{path} {state}: it says what the run there was computed from; restore it from a backup, choose another --out, or \
+                 discard the run with --fresh"
+            )
             .into()
         })
     }
@@ -143,33 +127,28 @@ impl Identity {
         }
     }
 
-    pub fn require(
-        &self,
-        configuration: &Configuration,
-        programs: &Programs,
-        out: &Path,
-        holds: Holds,
-    ) -> Result<(), Failure> {
-        if let Some(difference) = configuration.difference(&self.configuration)? {
-            return Err(other(out, holds, "configuration", &difference));
+    /// Checks that the run was of this configuration and of these programs; the error names what is
+    /// another.
+    pub fn require(&self, now: &Configuration, programs: &Programs) -> Result<(), Failure> {
+        if let Some(difference) = now.difference(&self.configuration)? {
+            return Err(format!("another configuration ({difference})").into());
         }
         let difference = self.programs.difference(programs);
-        difference.map_or(Ok(()), |it| Err(other(out, holds, "program", &it)))
+        difference.map_or(Ok(()), |it| Err(format!("another program ({it})").into()))
     }
 
     /// Checks that the recording is the one that the run was begun with, and is read in the same
-    /// way.
-    pub fn require_recording(&self, now: &Self, out: &Path, holds: Holds) -> Result<(), Failure> {
+    /// way; the error names what is another.
+    pub fn require_recording(&self, now: &Self) -> Result<(), Failure> {
         let options = |of: &Self| toml::Table::try_from(of.dataset);
         if let Some(difference) = difference::first(&options(self)?, &options(now)?) {
-            let difference = format!("dataset.{difference}");
-            return Err(other(out, holds, "configuration", &difference));
+            return Err(format!("another configuration (dataset.{difference})").into());
         }
         let difference = match (&self.recording, &now.recording) {
             (Some(begun), Some(now)) => begun.difference(now),
             _ => None,
         };
-        difference.map_or(Ok(()), |it| Err(other(out, holds, "recording", &it)))
+        difference.map_or(Ok(()), |it| Err(format!("another recording ({it})").into()))
     }
 
     /// Returns whether a run of this configuration that begins now would compute the same and judge
@@ -189,19 +168,6 @@ impl Identity {
             && self.dataset == resolved.dataset
             && self.recording == fingerprint(&resolved)?)
     }
-}
-
-fn other(out: &Path, holds: Holds, what: &str, difference: &str) -> Failure {
-    let out = out.display();
-    match holds {
-        Holds::Unfinished(poses) => format!(
-            "{out} holds an unfinished run of another {what} ({poses} poses; {difference}): choose another --out, or discard it with --fresh"
-        ),
-        Holds::Complete => format!(
-            "{out} holds the results of a complete run of another {what} ({difference}): choose another --out, or replace them with --fresh"
-        ),
-    }
-    .into()
 }
 
 fn checksum(text: &str) -> String {

@@ -15,10 +15,10 @@ mod results;
 mod summary;
 
 pub use georeference::georeference;
-pub use identity::{Holds, Identity, Programs};
+pub use identity::{Identity, Programs};
 pub use out::{
     Content, FILES, Out, OutError, REPLACED, SIMULATED_TRUTH, SUMMARY, absolute, require_results,
     write_page,
 };
 pub use results::{Results, map_options, truth_of, write};
-pub use summary::{Form, Problem, Session, Summary};
+pub use summary::{Form, HARDLY_MEASURED, Session, Summary};

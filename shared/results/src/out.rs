@@ -123,10 +123,7 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
 }
 
 fn unwritable(path: &Path) -> impl Fn(io::Error) -> OutError {
-    move |source| OutError::Unwritable {
-        path: path.to_owned(),
-        source,
-    }
+    move |source| OutError::Refused(format!("cannot write to {}: {source}", path.display()))
 }
 
 /// Checks that the results in the folder of a run belong to its configuration.
@@ -143,15 +140,9 @@ pub fn require_results(run: &Path) -> Result<(), OutError> {
 /// Why a path is invalid for the output of a command, or for results.
 #[derive(Debug, Error)]
 pub enum OutError {
-    #[error("cannot write to {path}: {source}", path = path.display())]
-    Unwritable { path: PathBuf, source: io::Error },
     /// Another run, map or localisation is writing to it.
-    #[error("another command is writing to {path}{holder}: wait for it, or choose another --out", path = path.display())]
-    Held {
-        path: PathBuf,
-        /// The process, if the system reports it: `, process 123 (gyre)`.
-        holder: String,
-    },
+    #[error("{0}")]
+    Held(String),
     #[error("{0}")]
     Refused(String),
 }
@@ -186,10 +177,13 @@ impl Out {
                 }
                 Ok(Self { path, _lock: lock })
             }
-            Attempt::Held(holder) => Err(OutError::Held {
-                path,
-                holder: holder.map_or(String::new(), |holder| format!(", {holder}")),
-            }),
+            Attempt::Held(holder) => {
+                let holder = holder.map_or(String::new(), |holder| format!(", {holder}"));
+                Err(OutError::Held(format!(
+                    "another command is writing to {}{holder}: wait for it, or choose another --out",
+                    path.display()
+                )))
+            }
         }
     }
 

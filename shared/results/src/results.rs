@@ -4,7 +4,6 @@
 //! The journal is read once, from its start to its end, and only the inputs of results are kept: a
 //! month takes no more memory than a minute. Only an evaluation needs all poses.
 
-mod estimate;
 mod files;
 mod map;
 mod objects;
@@ -27,7 +26,6 @@ use crate::{
     out::{Out, SIMULATED_TRUTH, SUMMARY},
     summary::{Measured, Session, SlamSummary, Summary},
 };
-use estimate::Estimate;
 use files::Files;
 use pass::{Pass, Read};
 use slam::Slam;
@@ -78,7 +76,7 @@ pub fn write(
     if let Some((refusal, false)) = gnss.as_ref().and_then(|it| it.refusal()) {
         print::note(format_args!("the fixes of GNSS are not used: {refusal}"));
     }
-    let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
+    let judgement = truth.and_then(|truth| judged(&truth, &read));
     match &judgement {
         Some(judgement) => {
             for (name, plot) in judgement.plots()? {
@@ -131,7 +129,7 @@ fn add_corrected(
     slam: &mut Slam,
     truth: Option<&Path>,
     Read {
-        estimate,
+        trajectory,
         corrected,
         ..
     }: &Read,
@@ -139,7 +137,7 @@ fn add_corrected(
     files.add("loops.csv", slam.loops_csv()?)?;
     files.add("graph.g2o", slam.graph_g2o())?;
     let mut summary = slam.summary();
-    summary.odometry = slam.errors_of(&estimate.trajectory);
+    summary.odometry = slam.errors_of(trajectory);
     // The evaluation of odometry reports an unusable truth.
     let truth = truth.and_then(|path| read_trajectory(path).ok());
     let Some(truth) = truth.filter(|_| corrected.len() > 1) else {
@@ -159,8 +157,8 @@ fn add_corrected(
 }
 
 /// Evaluates the trajectory and its covariances against the ground truth, if that fits.
-fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
-    if estimate.poses < 2 {
+fn judged(path: &Path, estimate: &Read) -> Option<Judgement> {
+    if estimate.trajectory.poses.len() < 2 {
         return None;
     }
     let by = |truth: Trajectory| -> Result<Judgement, Failure> {
@@ -172,8 +170,7 @@ fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
         let motions = motions.ok();
         Ok(Judgement::new(evaluation, motions.as_ref(), &options, None))
     };
-    let all = estimate.require_all();
-    let truth = all.and_then(|()| Ok(read_trajectory(path)?));
+    let truth = read_trajectory(path).map_err(Failure::from);
     let note = |reason: &Failure| {
         let truth = path.display();
         print::note(format_args!("not evaluated against {truth}: {reason}"));

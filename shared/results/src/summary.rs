@@ -15,7 +15,6 @@ use gyre_run::latency::{Latency, Percentiles};
 use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
 use serde::Serialize;
 use serde_json::{Value, json};
-use thiserror::Error;
 
 use crate::{figures, judgement::Judgement, machine::Machine};
 
@@ -54,48 +53,42 @@ fn network(masking: &MaskingConfig) -> Option<Value> {
     })
 }
 
-/// Why the results of a run that has played all scans are unreliable.
-#[derive(Clone, Debug, Error, Serialize)]
-#[error("{0}")]
-pub struct Problem(String);
+/// The words of a problem of motions that have few firm matches.
+pub const HARDLY_MEASURED: &str = "the radar hardly measured this trajectory";
 
-impl Problem {
-    /// The words of a problem of motions that have few firm matches.
-    pub const OF_MOTIONS: &str = "the radar hardly measured this trajectory";
-
-    fn of(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Option<Self> {
-        let scans = session.scans.unwrap_or(counts.processed as usize);
-        let log = out.join("log.jsonl");
-        let (poses, unreadable, log) = (counts.processed, counts.unreadable, log.display());
-        let sentence = if session.ending != Some(Ending::Complete) {
-            return None;
-        } else if poses < 2 {
-            format!(
-                "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
-            )
-        } else if let Some(damage) = session.damage {
-            let missing = counts.missing;
-            format!(
-                "{damage}; {unreadable} scans cannot be read and {missing} are missing by their times, and the results are of the others: `gyre inspect {data}` names all that is damaged"
-            )
-        } else if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
-            format!(
-                "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
-            )
-        } else {
-            let it = counts.too_many_are_unsure()?;
-            let (all, hardly_measured) = (it.refined + it.doubtful, Self::OF_MOTIONS);
-            let cause = match counts.dropped {
+/// Returns why the results of a run that has played all scans are unreliable.
+fn problem(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Option<String> {
+    let scans = session.scans.unwrap_or(counts.processed as usize);
+    let log = out.join("log.jsonl");
+    let (poses, unreadable, log) = (counts.processed, counts.unreadable, log.display());
+    let sentence = if session.ending != Some(Ending::Complete) {
+        return None;
+    } else if poses < 2 {
+        format!(
+            "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
+        )
+    } else if let Some(damage) = session.damage {
+        let missing = counts.missing;
+        format!(
+            "{damage}; {unreadable} scans cannot be read and {missing} are missing by their times, and the results are of the others: `gyre inspect {data}` names all that is damaged"
+        )
+    } else if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
+        format!(
+            "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
+        )
+    } else {
+        let it = counts.too_many_are_unsure()?;
+        let all = it.refined + it.doubtful;
+        let cause = match counts.dropped {
                 0 => "The mask keeps too little, or a constant in [dataset] is wrong: `gyre masks` and `gyre inspect` show which".to_owned(),
                 dropped => format!("{dropped} scans were dropped, and motions over dropped scans are long: `gyre stress` finds the rate that this machine keeps up with"),
             };
-            let (weak, predicted) = (it.weak, it.predicted);
-            format!(
-                "{weak} weak and {predicted} predicted motions of {all}: {hardly_measured}. {cause}"
-            )
-        };
-        Some(Self(sentence))
-    }
+        let (weak, predicted) = (it.weak, it.predicted);
+        format!(
+            "{weak} weak and {predicted} predicted motions of {all}: {HARDLY_MEASURED}. {cause}"
+        )
+    };
+    Some(sentence)
 }
 
 #[derive(Debug)]
@@ -118,7 +111,7 @@ pub struct Summary {
     /// `None`: the run failed.
     ending: Option<Ending>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    problem: Option<Problem>,
+    problem: Option<String>,
     mode: Mode,
     rate: Rate,
     window: usize,
@@ -176,8 +169,8 @@ impl Summary {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    pub fn problem(&self) -> Option<&Problem> {
-        self.problem.as_ref()
+    pub fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
     }
 
     pub fn new(
@@ -190,8 +183,8 @@ impl Summary {
             || session.ending.is_some() && configuration.is_radar();
         let (counts, gnss) = (&measured.counts, measured.gnss.as_ref());
         let of_sensors = || sensors::problem(configuration, counts, gnss);
-        let problem = Problem::of(&configuration.data(), out, session, counts)
-            .or_else(|| of_sensors().filter(|_| has_ended).map(Problem));
+        let problem = problem(&configuration.data(), out, session, counts)
+            .or_else(|| of_sensors().filter(|_| has_ended));
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         let recovery = report.into_iter().flat_map(|report| &report.recovery);
         Self {

@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use crate::failure::Failure;
+use crate::Failure;
 
 /// Returns a path of the program that this process executes, for its children too.
 pub fn own() -> PathBuf {

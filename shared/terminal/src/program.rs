@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use crate::{WIDTH, failure::Failure, print};
+use crate::{Failure, WIDTH, print};
 
 const WRONG_ARGUMENTS: u8 = 2;
 

@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_configuration::{Configuration, paths::shipped};
-use gyre_results::{Form, Holds, Identity, Out, OutError, Problem, SUMMARY};
+use gyre_results::{Form, HARDLY_MEASURED, Identity, Out, OutError, SUMMARY};
 use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
 use gyre_tools::batch::{End, Outcome};
@@ -95,7 +95,7 @@ fn is_finished(out: &Out, configuration: &Configuration) -> bool {
     let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
     // A run reports files that cannot be read.
     is_complete
-        && Identity::read(out, Holds::Complete)
+        && Identity::read(out)
             .and_then(|begun| is_same(&begun, configuration))
             .unwrap_or(false)
 }
@@ -107,7 +107,7 @@ fn finished(results: &Path, earlier: bool) -> Result<End, Failure> {
     let problem = summary["problem"].as_str();
     let outcome = match problem {
         None => Outcome::Complete,
-        Some(problem) if problem.contains(Problem::OF_MOTIONS) => Outcome::Unsure,
+        Some(problem) if problem.contains(HARDLY_MEASURED) => Outcome::Unsure,
         Some(_) => Outcome::Corrupt,
     };
     Ok(End {
@@ -124,7 +124,7 @@ fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> 
     Ok(match (&earlier, earlier.identity()) {
         (Earlier::Foreign(_) | Earlier::Complete(_), _) => false,
         // The run reports files that cannot be read, and keeps its poses.
-        (_, Some((begun, _))) => is_same(begun, configuration).unwrap_or(true),
+        (_, Some(begun)) => is_same(begun, configuration).unwrap_or(true),
         (_, None) => true,
     })
 }

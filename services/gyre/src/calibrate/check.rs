@@ -9,7 +9,7 @@ use gyre_results::{judgement::judge, truth_of};
 use gyre_samples::{GyroKind, WheelsKind};
 use gyre_terminal::Failure;
 
-use crate::cli::CalibrateArguments;
+use super::CalibrateArguments;
 
 /// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.
 pub(super) fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f64; 2]> {

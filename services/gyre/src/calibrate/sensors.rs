@@ -8,7 +8,7 @@ use gyre_calibration::{
 };
 use gyre_configuration::Configuration;
 use gyre_datasets::{GyroLog, WheelLog};
-use gyre_samples::{GyroConfig, GyroKind, WheelsConfig, WheelsKind};
+use gyre_samples::{GyroConfig, GyroKind, WheelsConfig};
 use gyre_terminal::{Failure, print};
 
 use super::Section;
@@ -16,7 +16,7 @@ use super::Section;
 macro_rules! sensor {
     (
         $sensor:ident: $title:literal, $is:literal, $section:ident, $calibrate:ident,
-        $log:ty, $config:ty, $of_log:path, $found:ty,
+        $log:ty, $config:ty, $found:ty,
         beside: $beside:expr, read: $read:expr, mean: $mean:expr, toml: $toml:expr
     ) => {
         pub(super) struct $sensor {
@@ -34,7 +34,7 @@ macro_rules! sensor {
             ) -> Result<Option<Self>, Failure> {
                 let configured = &configuration.odometry.$section;
                 let configured_file = configured.file.as_deref();
-                let named = named.or(configured_file.filter(|_| configured.kind == $of_log));
+                let named = named.or(configured_file.filter(|_| configured.kind == GyroKind::Log));
                 let file = named.map(Path::to_owned);
                 let (beside, read) = ($beside, $read);
                 let Some(file) = file.or_else(|| beside(&configuration.source.data)) else {
@@ -108,7 +108,7 @@ macro_rules! sensor {
 
 sensor! {
     Gyro: "gyro, log", "gyro is", gyro, calibrate_gyro,
-    GyroLog, GyroConfig, GyroKind::Log, GyroCalibration,
+    GyroLog, GyroConfig, GyroCalibration,
     beside: |folder: &Path| GyroLog::find(folder).ok(),
     read: |file: &Path, _: &GyroConfig| GyroLog::read(file),
     mean: GyroCalibration::mean,
@@ -117,7 +117,7 @@ sensor! {
 
 sensor! {
     Wheels: "wheels, log", "wheels are", wheels, calibrate_wheels,
-    WheelLog, WheelsConfig, WheelsKind::Log, WheelCalibration,
+    WheelLog, WheelsConfig, WheelCalibration,
     beside: |folder: &Path| WheelLog::find(folder).ok(),
     read: |file: &Path, config: &WheelsConfig| WheelLog::read(file, config.m_per_tick),
     mean: |one: &WheelCalibration, others: &[WheelCalibration]| -> Result<_, Failure> {

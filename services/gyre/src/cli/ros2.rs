@@ -1,8 +1,7 @@
 //! The arguments of `gyre ros2`.
 
 use clap::Args;
-use gyre_tools::export::FrameArguments;
-use gyre_tools::operate::RunChoice;
+use gyre_tools::{export::FrameArguments, operate::RunChoice};
 
 #[derive(Debug, Args)]
 pub struct Ros2Arguments {

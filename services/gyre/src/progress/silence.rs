@@ -16,13 +16,6 @@ pub struct Silence {
     reported: Option<i64>,
 }
 
-#[derive(Debug, PartialEq, Eq)]
-pub struct Report {
-    pub sentence: String,
-    /// False if it only continues the sentence before, with another time.
-    pub is_new: bool,
-}
-
 impl Silence {
     pub fn new(radar: String, now_ns: i64) -> Self {
         Self {
@@ -33,29 +26,24 @@ impl Silence {
         }
     }
 
-    pub fn update(&mut self, received: &Received, now_ns: i64) -> Option<Report> {
-        let last_scan_ns = received.last_scan.map(|scan| scan.at_ns);
-        let heard_ns = last_scan_ns.unwrap_or(i64::MIN).max(self.began_ns);
+    /// Returns a sentence when the radar has been silent for twice as long, or sends again.
+    pub fn update(&mut self, received: &Received, now_ns: i64) -> Option<String> {
         if received.is_receiving {
             let silent_s = seconds(now_ns - self.reported.take()?);
             self.next_ns = FIRST_NS;
-            return Some(Report {
-                sentence: format!("{} sends, after {silent_s} s of silence", self.radar),
-                is_new: true,
-            });
+            let radar = &self.radar;
+            return Some(format!("{radar} sends, after {silent_s} s of silence"));
         }
+        let last_scan_ns = received.last_scan.map(|scan| scan.at_ns);
+        let heard_ns = last_scan_ns.unwrap_or(i64::MIN).max(self.began_ns);
         let silent_ns = now_ns - heard_ns;
-        let is_new = silent_ns >= self.next_ns;
-        if is_new {
-            self.next_ns *= 2;
-            self.reported = Some(heard_ns);
+        if silent_ns < self.next_ns {
+            return None;
         }
-        self.reported?;
-        let silent_s = seconds(silent_ns);
-        Some(Report {
-            sentence: format!("waiting for {}: no scan for {silent_s} s", self.radar),
-            is_new,
-        })
+        self.next_ns *= 2;
+        self.reported = Some(heard_ns);
+        let (radar, silent_s) = (&self.radar, seconds(silent_ns));
+        Some(format!("waiting for {radar}: no scan for {silent_s} s"))
     }
 }
 
@@ -83,23 +71,11 @@ mod tests {
         }
     }
 
-    /// The reports of one second each, starting at 1 s, for the azimuths received by then.
-    fn reports(received: impl Fn(i64) -> Received, until_s: i64) -> Vec<(i64, Report)> {
-        let mut silence = Silence::new("the radar".to_owned(), 0);
-        (1..=until_s)
-            .filter_map(|at_s| {
-                let report = silence.update(&received(at_s), at_s * SECOND)?;
-                Some((at_s, report))
-            })
-            .collect()
-    }
-
-    /// The new sentences of a radar whose last scan and whose receipt these return.
+    /// The sentences of a radar in 40 s, a look a second, whose last scan and receipt these return.
     fn said(received: impl Fn(i64) -> Received) -> Vec<(i64, String)> {
-        let new = reports(received, 40)
-            .into_iter()
-            .filter(|(_, it)| it.is_new);
-        new.map(|(at_s, report)| (at_s, report.sentence)).collect()
+        let mut silence = Silence::new("the radar".to_owned(), 0);
+        let update = |at_s| Some((at_s, silence.update(&received(at_s), at_s * SECOND)?));
+        (1..=40).filter_map(update).collect()
     }
 
     #[test]
@@ -116,8 +92,6 @@ mod tests {
             said(received),
             expected.map(|(at_s, it)| (at_s, it.to_owned()))
         );
-        // A bar counts on in between.
-        assert_eq!(reports(received, 40).len(), 18);
         // One that sends, or that comes within a moment, is not mentioned.
         assert!(said(|at_s| heard(Some(at_s), true)).is_empty());
         assert!(said(|at_s| heard(None, at_s > 2)).is_empty());

@@ -5,20 +5,14 @@ use std::path::PathBuf;
 use gyre_configuration::{Configuration, calibration, strict::path_value};
 use gyre_results::absolute;
 use gyre_run::PlayedFrom;
+use gyre_terminal::Failure;
 use gyre_terminal::inputs::Given;
-use gyre_terminal::{Failure, print};
 
 use super::results_folder;
 use crate::cli::RunArguments;
 
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;
-    if arguments.from.is_some() && given.data.is_none() {
-        return Err(
-            "--from plays a recording of a run: name it, as in `gyre run NAME.mcap --from masked`"
-                .into(),
-        );
-    }
     let overrides = overrides(arguments, &given)?;
     let mut configuration = given.read(&overrides)?;
     if given.data.is_some() {
@@ -44,9 +38,6 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     if configuration.objects.is_on() {
         configuration.odometry.masking.resolve_library()?;
     }
-    let idle = configuration.without_effect(&arguments.inputs.set)?;
-    idle.iter()
-        .for_each(|sentence| print::note(format_args!("gyre: {sentence}")));
     // The run's processes receive the path of the run.
     path_value(&absolute(&results_folder(arguments)?)?)?;
     Ok(configuration)

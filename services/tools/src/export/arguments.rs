@@ -14,8 +14,8 @@ pub struct ExportArguments {
     pub mcap: Option<PathBuf>,
     /// Write the scans of a run in the form of its dataset instead, with each azimuth that was lost
     /// put back where the run has found it missing.
-    #[arg(long, value_enum, requires = "out", conflicts_with_all = ["mcap", "scans", "frames", "mounting"])]
-    pub format: Option<DatasetForm>,
+    #[arg(long, value_parser = ["radiate"], requires = "out", conflicts_with_all = ["mcap", "scans", "frames", "mounting"])]
+    pub format: Option<String>,
     /// The folder to write such a dataset to: a new or an empty one.
     #[arg(long, value_name = "FOLDER", requires = "format")]
     pub out: Option<PathBuf>,
@@ -44,13 +44,6 @@ pub struct FrameArguments {
         allow_hyphen_values = true
     )]
     pub mounting: String,
-}
-
-/// The form of a dataset whose scans are repaired.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum DatasetForm {
-    /// Images of range x azimuth and a list of times, as RADIATE has them.
-    Radiate,
 }
 
 /// The form of the scans in the bag.

@@ -32,7 +32,7 @@ const OPTIONS: &str = "dataset.toml";
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
 pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
-    let Some((_, configuration)) = source.run() else {
+    let Some(configuration) = source.configuration() else {
         return Err(
             "where azimuths were lost is known from a run: name the folder of its results".into(),
         );
@@ -49,7 +49,10 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
         dataset,
         found: source.lost()?,
         out: new_folder(out)?,
-        counts: Counts::default(),
+        scans: 0,
+        repaired: 0,
+        azimuths: 0,
+        anywhere: 0,
     };
     for index in played {
         writer.write(index)?;
@@ -62,7 +65,16 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     };
     write_file(&out.join(OPTIONS), toml::to_string(&options)?)?;
     copy_lists(&images, root, out)?;
-    writer.counts.describe(out)
+    let (out, scans, anywhere) = (out.display(), writer.scans, writer.anywhere);
+    let (repaired, azimuths) = (writer.repaired, writer.azimuths);
+    if anywhere > 0 {
+        print::note(format_args!(
+            "{anywhere} scans have lost azimuths but no pose, so that it is not known where: their azimuths are stretched over the whole turn"
+        ));
+    }
+    print::line(format_args!(
+        "{out}: {scans} scans, {repaired} of them repaired, which had lost {azimuths} azimuths"
+    ))
 }
 
 fn recording(configuration: &Configuration) -> Result<Box<dyn Dataset>, Failure> {
@@ -99,7 +111,11 @@ struct Writer {
     scan: OwnedScan,
     found: Lost,
     out: PathBuf,
-    counts: Counts,
+    scans: usize,
+    repaired: usize,
+    azimuths: usize,
+    /// Scans whose lost azimuths have unknown places.
+    anywhere: usize,
 }
 
 impl Writer {
@@ -115,16 +131,16 @@ impl Writer {
         let from = self.dataset.file(index);
         let to = self.out.join(from.file_name().unwrap_or_default());
         let lost = stale_rows(&self.scan.view());
-        self.counts.scans += 1;
+        self.scans += 1;
         if lost == 0 {
             return copy(from, &to);
         }
-        self.counts.repaired += 1;
-        self.counts.azimuths += lost;
+        self.repaired += 1;
+        self.azimuths += lost;
         let places = match self.found.get(&(index as u64)) {
             // Anywhere, if live mode has dropped it.
             None => {
-                self.counts.anywhere += 1;
+                self.anywhere += 1;
                 LostAzimuths::anywhere(lost, self.scan.geometry.azimuths)
             }
             Some(found) if found.count() == lost => *found,
@@ -176,28 +192,4 @@ fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
 fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
     fs::copy(from, to).map_err(StorageError::at("copy", from))?;
     Ok(())
-}
-
-#[derive(Debug, Default)]
-struct Counts {
-    scans: usize,
-    repaired: usize,
-    azimuths: usize,
-    /// Scans whose lost azimuths have unknown places.
-    anywhere: usize,
-}
-
-impl Counts {
-    fn describe(&self, out: &Path) -> Result<(), Failure> {
-        let (out, scans, anywhere) = (out.display(), self.scans, self.anywhere);
-        let (repaired, azimuths) = (self.repaired, self.azimuths);
-        if anywhere > 0 {
-            print::note(format_args!(
-                "{anywhere} scans have lost azimuths but no pose, so that it is not known where: their azimuths are stretched over the whole turn"
-            ));
-        }
-        print::line(format_args!(
-            "{out}: {scans} scans, {repaired} of them repaired, which had lost {azimuths} azimuths"
-        ))
-    }
 }

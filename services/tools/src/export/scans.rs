@@ -12,9 +12,12 @@ use gyre_ros2_messages::{
 };
 use gyre_terminal::{Failure, print};
 
-use crate::export::{
-    arguments::ScanForm,
-    source::{Lost, Scans, Source},
+use crate::{
+    export::{
+        arguments::ScanForm,
+        source::{Lost, Scans, Source},
+    },
+    radar_server::configuration,
 };
 
 const CONFIGURATION: &str = "/radar_data/configuration_data";
@@ -25,6 +28,8 @@ pub struct ScanWriter {
     losses: Losses,
     scans: Scans,
     scan: OwnedScan,
+    /// The number of the scan if it has been read, and is to be written.
+    first: Option<usize>,
     lost: Lost,
     rows: PlacedRows,
     messages: ScanMessages,
@@ -51,6 +56,13 @@ struct Losses {
     retimed_by_ns: u64,
     /// The radar's constants in the settings of `[dataset]`.
     constants: Vec<(&'static str, f32)>,
+}
+
+/// Returns the sentences that hold.
+macro_rules! sentences {
+    ($($holds:expr => $sentence:literal;)*) => {
+        [$($holds.then(|| format!($sentence)),)*].into_iter().flatten().collect()
+    };
 }
 
 impl Losses {
@@ -88,25 +100,12 @@ impl Losses {
         if geometry.sense != Sense::Clockwise {
             return Err("Navtech's radars turn clockwise, and this one does not: --scans none leaves its scans out".into());
         }
-        let (azimuths, bins) = (geometry.azimuths, geometry.bins);
-        let small = |number: usize| {
-            u16::try_from(number).map_err(|_| {
-                format!("scans of {azimuths} azimuths and {bins} range bins do not fit Navtech's messages, which count both in 16 bits")
-            })
-        };
-        let encoder = Encoder::of(&scan.azimuth_rad[..azimuths], scans.encoder_counts);
+        let encoder = Encoder::of(&scan.azimuth_rad[..geometry.azimuths], scans.encoder_counts);
         self.without_encoder = !encoder.is_exact;
-        let turns_per_1000_s = 1e12 / scans.dataset.period_ns().max(1) as f64;
         Ok(Radar {
-            azimuth_samples: small(azimuths)?,
             bin_size: 0,
-            range_in_bins: small(bins)?,
-            encoder_size: encoder.counts,
-            rotation_mhz: turns_per_1000_s.round().min(f64::from(u16::MAX)) as u16,
             packet_rate: 0,
-            range_gain: 1.0,
-            range_offset: 0.0,
-            range_resolution_m: Some(geometry.range_resolution_m),
+            ..configuration(scans.dataset.as_ref(), geometry, encoder.counts)?
         })
     }
 
@@ -117,54 +116,23 @@ impl Losses {
         let constants = self.constants.iter();
         let settings = constants.map(|(key, value)| format!(" --set dataset.{key}={value}"));
         let settings: String = settings.collect();
-        let sentences = [
-            (
-                unreadable > 0,
-                format!("{unreadable} scans cannot be read, and are not in the bag"),
-            ),
-            (
-                self.without_encoder,
-                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn"
-                    .to_owned(),
-            ),
-            (
-                self.chirps,
-                "Navtech's messages do not contain the directions of chirps: the bag lacks them"
-                    .to_owned(),
-            ),
-            (
-                interpolated > 0,
-                format!(
-                    "interpolated rows: {interpolated}. Navtech's messages cannot carry them; a run on the bag finds them missing"
-                ),
-            ),
-            (
-                placed > 0,
-                format!(
-                    "{placed} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to the angles of the other scans"
-                ),
-            ),
-            (
-                not_placed > 0,
-                format!(
-                    "{not_placed} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right"
-                ),
-            ),
-            (
-                retimed > 0,
-                format!(
-                    "{retimed} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away"
-                ),
-            ),
-            (
-                !settings.is_empty(),
-                format!(
-                    "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{settings}"
-                ),
-            ),
-        ];
-        let lost = sentences.into_iter().filter(|(is_lost, _)| *is_lost);
-        lost.map(|(_, sentence)| sentence).collect()
+        sentences!(
+            unreadable > 0 => "{unreadable} scans cannot be read, and are not in the bag";
+            self.without_encoder =>
+                "the angles of the scans are of no encoder: they are rounded to 1/65535 of a turn";
+            self.chirps =>
+                "Navtech's messages do not contain the directions of chirps: the bag lacks them";
+            interpolated > 0 =>
+                "interpolated rows: {interpolated}. Navtech's messages cannot carry them; a run on the bag finds them missing";
+            placed > 0 =>
+                "{placed} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to the angles of the other scans";
+            not_placed > 0 =>
+                "{not_placed} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right";
+            retimed > 0 =>
+                "{retimed} scans have another time than the middle of their first and last azimuth, which is their time in the bag: up to {ms:.3} ms away";
+            !settings.is_empty() =>
+                "Navtech's messages have no place for constants of this radar: who runs on the bag sets them with{settings}";
+        )
     }
 }
 
@@ -183,10 +151,11 @@ impl ScanWriter {
             print::note("the run was of a radar, and has no scans: --record keeps them");
             return Ok(None);
         };
-        let Some(scan) = first(&mut scans)? else {
+        let mut losses = Losses::default();
+        let mut scan = OwnedScan::with_limits(scans.dataset.limits());
+        let Some(first) = scans.next(&mut scan, &mut losses)? else {
             return Ok(None);
         };
-        let mut losses = Losses::default();
         let radar = losses.radar(&scans, &scan)?;
         losses.add_constants(&scan.geometry, scans.eccentricity_rad);
         let configuration = bag.topic(CONFIGURATION, Kept::ForLater)?;
@@ -204,6 +173,7 @@ impl ScanWriter {
             lost: source.lost()?,
             rows: PlacedRows::default(),
             scan,
+            first: Some(first),
             scans,
             is_described: false,
         }))
@@ -211,17 +181,11 @@ impl ScanWriter {
 
     /// Writes the next scan that can be read, and returns its time; `None` at the end.
     pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
-        while let Some(index) = self.scans.played.next() {
-            match self.scans.read(index, &mut self.scan) {
-                Ok(()) => return self.write(index, bag).map(Some),
-                Err(error @ ReadError::Io { .. }) => return Err(error.into()),
-                Err(error) => {
-                    print::note(format_args!("scan {index} is left out: {error}"));
-                    self.losses.unreadable += 1;
-                }
-            }
-        }
-        Ok(None)
+        let next = match self.first.take() {
+            None => self.scans.next(&mut self.scan, &mut self.losses)?,
+            first => first,
+        };
+        next.map(|index| self.write(index, bag)).transpose()
     }
 
     /// Prints the differences between the bag and its source.
@@ -260,6 +224,25 @@ impl ScanWriter {
 }
 
 impl Scans {
+    /// Reads the next scan that can be read, and returns its number; `None` at the end.
+    fn next(
+        &mut self,
+        scan: &mut OwnedScan,
+        losses: &mut Losses,
+    ) -> Result<Option<usize>, Failure> {
+        while let Some(index) = self.played.next() {
+            match self.read(index, scan) {
+                Ok(()) => return Ok(Some(index)),
+                Err(error @ ReadError::Io { .. }) => return Err(error.into()),
+                Err(error) => {
+                    print::note(format_args!("scan {index} is left out: {error}"));
+                    losses.unreadable += 1;
+                }
+            }
+        }
+        Ok(None)
+    }
+
     /// Reads a scan with the angles as the encoder counts them.
     fn read(&mut self, index: usize, scan: &mut OwnedScan) -> Result<(), ReadError> {
         scan.geometry = self.dataset.read(index, scan.slot())?;
@@ -276,18 +259,6 @@ impl Scans {
         }
         Ok(())
     }
-}
-
-fn first(scans: &mut Scans) -> Result<Option<OwnedScan>, Failure> {
-    let mut scan = OwnedScan::with_limits(scans.dataset.limits());
-    for index in scans.played.clone() {
-        match scans.read(index, &mut scan) {
-            Ok(()) => return Ok(Some(scan)),
-            Err(error @ ReadError::Io { .. }) => return Err(error.into()),
-            Err(_) => {}
-        }
-    }
-    Ok(None)
 }
 
 #[cfg(test)]

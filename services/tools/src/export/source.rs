@@ -118,10 +118,10 @@ impl Source {
         })
     }
 
-    /// Returns the folder of a run's results with its configuration; `None` of another source.
-    pub fn run(&self) -> Option<(&Path, &Configuration)> {
+    /// Returns the configuration of a run; `None` of another source.
+    pub fn configuration(&self) -> Option<&Configuration> {
         match &self.kind {
-            Kind::Run(configuration) => Some((&self.path, configuration)),
+            Kind::Run(configuration) => Some(configuration),
             Kind::Recording | Kind::Dataset => None,
         }
     }
@@ -162,8 +162,9 @@ impl Source {
     /// source.
     pub fn lost(&self) -> Result<Lost, Failure> {
         let mut lost = Lost::new();
-        if let Some((run, _)) = self.run() {
-            for pose in journal::records(&journal::path(run))?.into_iter().flatten() {
+        if matches!(self.kind, Kind::Run(_)) {
+            let records = journal::records(&journal::path(&self.path))?;
+            for pose in records.into_iter().flatten() {
                 let item = pose?.item;
                 if !item.is(flag::END) {
                     lost.insert(item.scan, item.lost_azimuths());

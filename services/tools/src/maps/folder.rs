@@ -1,13 +1,12 @@
 //! The folder of a map, which is replaced as a whole.
 
 use std::{
-    fmt::Display,
     fs, io,
     path::{Path, PathBuf},
 };
 
 use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
-use gyre_results::{Content, Out, OutError};
+use gyre_results::{Content, Out};
 use gyre_slam::{Keyframe, Record, localisation::Map};
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::Failure;
@@ -27,21 +26,15 @@ pub fn settle(map: &Path) -> Result<(), Failure> {
     if !is_interrupted(map) {
         return Ok(());
     }
-    let path = map.display();
-    let _locked = Out::lock_for(map, Content::MAP).map_err(|error| match error {
-        OutError::Held { holder, .. } => {
-            format!("the map {path} is being replaced by another command{holder}: wait for it")
-        }
-        OutError::Unwritable { source, .. } => unfinished(&path, &source),
-        other => other.to_string(),
-    })?;
-    Ok(finish(map).map_err(|error| unfinished(&path, &error.source))?)
-}
-
-fn unfinished(map: &impl Display, source: &io::Error) -> String {
-    format!(
-        "the map {map} was left half replaced by a command that was killed, and cannot be put right ({source}): let its owner read it once, with gyre localise, or draw it again"
-    )
+    let locked = Out::lock_for(map, Content::MAP).map_err(Failure::from);
+    let finished = locked.and_then(|_locked| Ok(finish(map)?));
+    finished.map_err(|error| {
+        format!(
+            "the map {} was left half replaced by a command that was killed, and cannot be put right: {error}",
+            map.display()
+        )
+        .into()
+    })
 }
 
 /// Writes a map and its keyframes into `out`. A map that is there stays as it is until the new one
@@ -184,7 +177,7 @@ mod tests {
         write_all(&map.join(NEXT), "later");
         let writing = Out::lock_for(map, Content::MAP).unwrap();
         let refused = settle(map).unwrap_err().to_string();
-        assert!(refused.contains("is being replaced by another"));
+        assert!(refused.contains("another command is writing"));
         drop(writing);
         settle(map).unwrap();
         assert_eq!(content(map, "map.toml"), "later");

@@ -6,10 +6,9 @@ pub mod searched_map;
 
 use std::{
     fmt::Write,
-    io::IsTerminal,
     path::{Path, PathBuf},
     process::ExitCode,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use clap::Args;
@@ -22,9 +21,9 @@ use gyre_results::{Content, Out};
 use gyre_slam::localisation::{Localisation, Localiser, Map as KeptMap, Observation, Status};
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::{Failure, inputs::Inputs, print};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use crate::bar::Bar;
 use counts::Counts;
 
 pub use scans::{RegisteredScan, Scans};
@@ -38,8 +37,6 @@ const PICTURE: &str = "fixes.png";
 /// a tenth of it on the map four, each found by 86 %, and none of them once in 2,600 drives.
 const FIRST: usize = 20;
 const PROBES: usize = 40;
-/// Time between two plain lines.
-const EVERY: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Args)]
 pub struct LocaliseArguments {
@@ -123,11 +120,12 @@ struct Found {
 
 impl Found {
     fn add(&mut self, scan: &RegisteredScan<'_>, found: &Localisation) {
-        self.counts.add(scan, found.status);
+        let stamp_ns = scan.observation.stamp_ns;
+        self.counts.add(scan.number, stamp_ns, found.status);
         let is_fix = matches!(found.status, Status::Found | Status::Tracked);
         match (&found.fix, self.pieces.last_mut()) {
             (Some(fix), Some(piece)) if is_fix => {
-                self.stamps_ns.push(scan.observation.stamp_ns);
+                self.stamps_ns.push(stamp_ns);
                 piece.push(fix.pose.motion);
             }
             (_, Some(piece)) if piece.is_empty() => {}
@@ -147,7 +145,7 @@ fn follow(
 ) -> Result<(), Failure> {
     fixes.append(HEADER)?;
     all.pieces.push(Vec::new());
-    let (mut progress, mut row) = (Progress::new(scans.played.len()), String::new());
+    let (mut progress, mut row) = (Bar::new(Some(scans.played.len())), String::new());
     while let Some(scan) = scans.register_next()? {
         if scan.starts {
             localiser.reset();
@@ -158,7 +156,8 @@ fn follow(
         fixes.append(&row)?;
         all.add(&scan, &found);
         let counts = &all.counts;
-        progress.show(counts.scans(), found.status);
+        let done = counts.scans() as u64;
+        progress.scans(done, done, status_name(found.status).to_owned());
         if counts.scans() == FIRST && !counts.has_fix() && !scans.played.is_empty() {
             let is_found = |it: &Observation<'_>| localiser.find(it.points, &it.twist).is_some();
             if !Scans::open(configuration)?.any_of(PROBES, is_found)? {
@@ -166,9 +165,7 @@ fn follow(
             }
         }
     }
-    if let Some(bar) = progress.bar {
-        bar.finish_and_clear();
-    }
+    progress.finish();
     Ok(())
 }
 
@@ -223,37 +220,4 @@ fn draw(map: &Path, path: &Found, out: &Path) -> Result<(), Failure> {
     };
     let picture = map_png(&mut Map::open(map)?, &overlay)?;
     Ok(storage::write(&out.join(PICTURE), picture)?)
-}
-
-/// A bar on a terminal, plain lines elsewhere.
-struct Progress {
-    bar: Option<ProgressBar>,
-    scans: usize,
-    last_line: Instant,
-}
-
-impl Progress {
-    fn new(scans: usize) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:32} {pos}/{len} scans  {msg}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
-            ProgressBar::new(scans as u64).with_style(style)
-        });
-        Self {
-            bar,
-            scans,
-            last_line: Instant::now(),
-        }
-    }
-
-    fn show(&mut self, done: usize, status: Status) {
-        let name = status_name(status);
-        if let Some(bar) = &self.bar {
-            bar.set_position(done as u64);
-            bar.set_message(name);
-        } else if self.last_line.elapsed() >= EVERY {
-            print::note(format_args!("{done}/{} scans  {name}", self.scans));
-            self.last_line = Instant::now();
-        }
-    }
 }

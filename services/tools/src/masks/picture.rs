@@ -1,28 +1,23 @@
 //! Pictures as PNG files.
 
-use std::{fs::File, io::BufWriter, path::Path};
+use std::{fs, path::Path};
 
+use gyre_mapping::encode_png;
 use gyre_terminal::Failure;
+use png::ColorType;
 
 pub fn write_grey(path: &Path, width: usize, pixels: &[u8]) -> Result<(), Failure> {
-    encode(path, width, png::ColorType::Grayscale, pixels)
+    write(path, encode_png(width, ColorType::Grayscale, pixels)?)
 }
 
 pub fn write_rgb(path: &Path, width: usize, pixels: &[[u8; 3]]) -> Result<(), Failure> {
-    encode(path, width, png::ColorType::Rgb, pixels.as_flattened())
+    write(
+        path,
+        encode_png(width, ColorType::Rgb, pixels.as_flattened())?,
+    )
 }
 
-fn encode(path: &Path, width: usize, color: png::ColorType, bytes: &[u8]) -> Result<(), Failure> {
-    let height = bytes.len() / (width * color.samples()).max(1);
-    let written = || -> Result<(), png::EncodingError> {
-        let file = BufWriter::new(File::create(path)?);
-        let mut encoder = png::Encoder::new(file, width as u32, height as u32);
-        encoder.set_color(color);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(bytes)?;
-        writer.finish()
-    };
+fn write(path: &Path, picture: Vec<u8>) -> Result<(), Failure> {
     let failed = |error| format!("cannot write the picture {}: {error}", path.display());
-    Ok(written().map_err(failed)?)
+    Ok(fs::write(path, picture).map_err(failed)?)
 }

@@ -13,7 +13,7 @@ use std::{
 
 use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
 use gyre_datasets::Dataset;
-use gyre_radar::{OwnedScan, PolarScan, scan::flag};
+use gyre_radar::{OwnedScan, PolarScan, SweepGeometry, scan::flag};
 use gyre_terminal::{Failure, print};
 
 use crate::radar_server::RadarServerArguments;
@@ -55,7 +55,8 @@ pub fn serve(
     let first = scans.start;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
-    let radar = configuration(dataset, scan.view())?;
+    let encoder_size = dataset.encoder_counts().unwrap_or(ENCODER_COUNTS);
+    let radar = configuration(dataset, &scan.geometry, encoder_size)?;
     let (output, address, is_public) = Output::open(arguments, &radar)?;
     print::note(format_args!("gyre: playing {what} as a radar at {address}"));
     if is_public {
@@ -106,13 +107,17 @@ pub fn serve(
     }
 }
 
-fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, Failure> {
-    let geometry = scan.geometry;
+/// Returns what a radar with these scans says about itself.
+pub(crate) fn configuration(
+    dataset: &dyn Dataset,
+    geometry: &SweepGeometry,
+    encoder_size: u16,
+) -> Result<Configuration, Failure> {
     let (azimuths, bins) = (geometry.azimuths, geometry.bins);
     let small = |number: usize| {
         let too_large = |_| {
             format!(
-                "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
+                "scans of {azimuths} azimuths and {bins} range bins do not fit Navtech's protocol, which counts both in 16 bits"
             )
         };
         u16::try_from(number).map_err(too_large)
@@ -126,7 +131,7 @@ fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configura
         azimuth_samples: small(azimuths)?,
         bin_size: rounded(f64::from(resolution_m) * 1e4),
         range_in_bins: small(bins)?,
-        encoder_size: dataset.encoder_counts().unwrap_or(ENCODER_COUNTS),
+        encoder_size,
         rotation_mhz: rounded(1e12 / period_ns),
         packet_rate: rounded(azimuths as f64 * 1e9 / period_ns),
         range_gain: 1.0,

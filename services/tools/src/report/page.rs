@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use gyre_configuration::difference::keys;
 use gyre_evaluation::plot::paths_svg;
 use gyre_geometry::Pose;
 use gyre_messages::StageId;
 use gyre_results::figures::{Figure, GROUPS};
 use gyre_terminal::Failure;
-use toml::{Table, Value};
+use toml::Table;
 
 use crate::report::{
     html::{escaped, png, section, svg},
@@ -23,8 +24,6 @@ const PICTURES: [[&str; 3]; 3] = [
     ["Errors", "errors.svg", "By the length of segments, as KITTI measures them from 100 m on; of a shorter drive, of each motion"],
     ["Uncertainty", "bands.svg", "The error of each pose within three standard deviations that its covariance states"],
 ];
-/// Larger maps are left out, bytes.
-const LARGEST_MAP: usize = 16 << 20;
 /// Pixels of a bar that stands for the longest time.
 const BAR: f64 = 160.0;
 
@@ -138,10 +137,6 @@ fn pictures(subjects: &[Subject], [title, name, caption]: [&str; 3]) -> String {
         let bytes = run.picture(name)?;
         let picture = match str::from_utf8(&bytes) {
             Ok(text) => svg(text, title),
-            Err(_) if bytes.len() > LARGEST_MAP => {
-                let path = escaped(&run.folder.join(name).display().to_string());
-                format!("<p>too large for this page: {path}</p>")
-            }
             Err(_) => png(&bytes, title),
         };
         Some(format!("{}{picture}\n", title_of(subject, subjects)))
@@ -210,7 +205,8 @@ fn configurations(subjects: &[Subject]) -> String {
 }
 
 fn differences(runs: &[(&Subject, &Run)]) -> String {
-    let keys = runs.iter().map(|(_, run)| keys(&run.configuration));
+    let table = |run: &Run| run.configuration.parse::<Table>().unwrap_or_default();
+    let keys = runs.iter().map(|(_, run)| keys(&table(run)));
     let keys: Vec<BTreeMap<String, String>> = keys.collect();
     let all: BTreeSet<&String> = keys.iter().flat_map(BTreeMap::keys).collect();
     let differ = |key: &&&String| keys.iter().any(|it| it.get(**key) != keys[0].get(**key));
@@ -230,28 +226,6 @@ fn differences(runs: &[(&Subject, &Run)]) -> String {
     format!(
         "<p>The keys in which the runs differ.</p>\n<div class=\"wide\"><table>\n{head}<tbody>\n{rows}</tbody></table></div>"
     )
-}
-
-fn keys(configuration: &str) -> BTreeMap<String, String> {
-    let table: Table = configuration.parse().unwrap_or_default();
-    let mut found = BTreeMap::new();
-    collect("", &Value::Table(table), &mut found);
-    found
-}
-
-fn collect(key: &str, value: &Value, found: &mut BTreeMap<String, String>) {
-    match value {
-        Value::Table(table) => table.iter().for_each(|(name, value)| {
-            let key = match key.is_empty() {
-                true => name.clone(),
-                false => format!("{key}.{name}"),
-            };
-            collect(&key, value, found);
-        }),
-        value => {
-            found.insert(key.to_owned(), value.to_string());
-        }
-    }
 }
 
 #[cfg(test)]

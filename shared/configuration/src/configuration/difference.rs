@@ -1,30 +1,37 @@
 //! Comparison of a configuration with the one that a run was begun with.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use toml::{Table, Value};
+
+/// Returns the values of all keys by their whole names, as `masking.threshold`.
+pub fn keys(table: &Table) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    collect("", table, &mut found);
+    found
+}
+
+fn collect(section: &str, table: &Table, found: &mut BTreeMap<String, String>) {
+    for (name, value) in table {
+        let key = match section {
+            "" => name.clone(),
+            _ => format!("{section}.{name}"),
+        };
+        match value {
+            Value::Table(table) => collect(&key, table, found),
+            value => drop(found.insert(key, value.to_string())),
+        }
+    }
+}
 
 /// Returns the first difference, as `masking.threshold was 60 and is now 70`.
 pub fn first(begun: &Table, now: &Table) -> Option<String> {
-    let keys: std::collections::BTreeSet<&String> = begun.keys().chain(now.keys()).collect();
-    keys.into_iter()
-        .find_map(|key| of_key(key, begun.get(key), now.get(key)))
-}
-
-fn of_key(key: &str, begun: Option<&Value>, now: Option<&Value>) -> Option<String> {
-    let empty = Table::new();
-    let tables = [begun, now].map(|value| value.and_then(Value::as_table));
-    match tables {
-        [None, None] if begun == now => None,
-        [None, None] => {
-            let shown = |value: Option<&Value>| value.map_or("unset".to_owned(), Value::to_string);
-            Some(format!(
-                "{key} was {} and is now {}",
-                shown(begun),
-                shown(now)
-            ))
-        }
-        [begun, now] => first(begun.unwrap_or(&empty), now.unwrap_or(&empty))
-            .map(|difference| format!("{key}.{difference}")),
-    }
+    let (begun, now) = (keys(begun), keys(now));
+    let all: BTreeSet<&String> = begun.keys().chain(now.keys()).collect();
+    let differs = |key: &&String| begun.get(*key) != now.get(*key);
+    let key = all.into_iter().find(differs)?;
+    let [was, is] = [&begun, &now].map(|it| it.get(key).map_or("unset", String::as_str));
+    Some(format!("{key} was {was} and is now {is}"))
 }
 
 #[cfg(test)]

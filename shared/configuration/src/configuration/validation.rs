@@ -12,7 +12,7 @@ use gyre_slam::SlamKind;
 
 use super::Configuration;
 use crate::{
-    error::ConfigurationError,
+    ConfigurationError,
     method::MethodConfig,
     strict::{value, within},
 };
@@ -50,7 +50,11 @@ impl Configuration {
             ("source", "silence_s", source.silence_s),
             ("record", "split_s", self.record.split_s),
         ] {
-            zero_or_more(section, key, number)?;
+            let is_valid = number >= 0.0 && number.is_finite();
+            if !is_valid {
+                let reason = format!("{key} is {number}, but must be 0 or more");
+                return Err(value(section, reason));
+            }
         }
         if let Some((key, time_s)) = source.faults.iter().find_map(PlayedFault::invalid) {
             let reason = format!("faults has {key} = {time_s}, but must have 0 or more");
@@ -234,16 +238,6 @@ impl Configuration {
                 Some("without refinement there is no topic `refined`: use `motion`")
             }
             _ => None,
-        }
-    }
-}
-
-fn zero_or_more(section: &str, key: &str, number: f64) -> Result<(), ConfigurationError> {
-    match number >= 0.0 && number.is_finite() {
-        true => Ok(()),
-        false => {
-            let reason = format!("{key} is {number}, but must be 0 or more");
-            Err(value(section, reason))
         }
     }
 }

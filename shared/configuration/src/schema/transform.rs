@@ -7,7 +7,7 @@ use schemars::{
 use serde_json::Value;
 
 /// Removes null, which TOML lacks, details that a reader does not need (defaults of whole sections,
-/// Rust's formats and links), and the digits that an `f32` gains as an `f64`.
+/// Rust's formats, breaks of lines), and the digits that an `f32` gains as an `f64`.
 #[derive(Clone, Debug)]
 pub struct ForToml;
 
@@ -23,7 +23,7 @@ impl Transform for ForToml {
             _ => {}
         }
         if let Some(Value::String(text)) = schema.get_mut("description") {
-            *text = plain(text);
+            *text = text.replace('\n', " ");
         }
     }
 }
@@ -53,23 +53,4 @@ fn shortest(number: &Value) -> Value {
     let text = number.as_f64().map(|number| (number as f32).to_string());
     let short = text.and_then(|text| text.parse::<f64>().ok());
     short.map_or(number.clone(), Value::from)
-}
-
-/// One line, with the text of Rust's links alone.
-fn plain(description: &str) -> String {
-    let mut text = description.replace('\n', " ");
-    while let Some((before, rest)) = text.split_once("[`") {
-        let Some((name, after)) = rest.split_once("`]") else {
-            break;
-        };
-        let after = match after
-            .strip_prefix('(')
-            .and_then(|link| link.split_once(')'))
-        {
-            Some((_, after)) => after,
-            None => after,
-        };
-        text = format!("{before}`{name}`{after}");
-    }
-    text
 }

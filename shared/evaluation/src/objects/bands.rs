@@ -1,29 +1,19 @@
 //! Sums over pairs of true and tracked objects, of all and of bands of range and speed.
 
+use std::ops::Range;
+
 use gyre_geometry::wrap_angle;
 use serde::Serialize;
 
 use super::{TrackedObject, TrueObject, distance_m, share};
 
-/// A band of range, m, or speed, m/s: from the first up to the second.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Band(f64, f64);
-
-pub(super) const ALL: Band = Band(0.0, f64::INFINITY);
+pub(super) const ALL: Range<f64> = 0.0..f64::INFINITY;
 
 /// Bands of range, m. Up to 60 m a beam of 1.8 degrees is no wider than a car, and a step of 0.9
 /// degrees no wider than half of one.
-pub(super) const RANGES_M: [Band; 3] =
-    [Band(0.0, 20.0), Band(20.0, 40.0), Band(40.0, f64::INFINITY)];
+pub(super) const RANGES_M: [Range<f64>; 3] = [0.0..20.0, 20.0..40.0, 40.0..f64::INFINITY];
 /// Bands of speed, m/s: walking pace to a turn, a town, a road.
-pub(super) const SPEEDS_MPS: [Band; 3] =
-    [Band(0.0, 5.0), Band(5.0, 10.0), Band(10.0, f64::INFINITY)];
-
-impl Band {
-    pub fn contains(&self, value: f64) -> bool {
-        (self.0..self.1).contains(&value)
-    }
-}
+pub(super) const SPEEDS_MPS: [Range<f64>; 3] = [0.0..5.0, 5.0..10.0, 10.0..f64::INFINITY];
 
 /// The figures of the objects in a band of range or speed. False positives count in the band of the
 /// tracked object, the others in the band of the true object.
@@ -92,10 +82,10 @@ impl Sums {
         share(self.nees, self.moving_pairs)
     }
 
-    pub fn in_band(&self, band: &Band) -> ObjectBand {
+    pub fn in_band(&self, band: &Range<f64>) -> ObjectBand {
         ObjectBand {
-            from: band.0,
-            to: Some(band.1).filter(|bound| bound.is_finite()),
+            from: band.start,
+            to: Some(band.end).filter(|bound| bound.is_finite()),
             required: self.required,
             recall: share(self.matched as f64, self.required),
             precision: share(self.matched as f64, self.matched + self.false_positives),

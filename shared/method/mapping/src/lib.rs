@@ -31,6 +31,7 @@ pub use georeference::{Origin, OriginError};
 pub use map::{Map, require_tiles_only, write_map};
 pub use options::{MapOptions, OptionError};
 pub use picture::{Overlay, legible, map_png};
+pub use pixels::encode as encode_png;
 pub use source::{MapError, TileSource};
 pub use tile::{Cell, TILE_CELLS, TileExtent, TileImage, TileIndex};
 pub use view::View;

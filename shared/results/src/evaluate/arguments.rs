@@ -1,9 +1,8 @@
 //! The command line of `gyre evaluate`.
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use clap::Args;
-use gyre_evaluation::Part;
 
 /// The arguments of `gyre evaluate`.
 #[derive(Debug, Args)]
@@ -42,7 +41,7 @@ pub struct EvaluateArguments {
     /// The part of the drive whose covariances are evaluated: all, or from A to B percent of its
     /// time as in 0..50. Scales that are tuned on one part can be validated on another.
     #[arg(long, value_name = "A..B", default_value = "all", value_parser = part)]
-    pub nees_part: Part,
+    pub nees_part: Range<f64>,
     /// Standard deviation of the ground truth's x and y, m: added to the covariances that are
     /// evaluated.
     #[arg(long, default_value = "0", value_parser = sigma)]
@@ -62,16 +61,30 @@ fn sigma(text: &str) -> Result<f64, String> {
 }
 
 /// Parses `all`, or `A..B` in percent.
-fn part(text: &str) -> Result<Part, String> {
+fn part(text: &str) -> Result<Range<f64>, String> {
     let share = |percent: &str| percent.parse::<f64>().ok().map(|percent| percent / 100.0);
     let range = || {
         let (from, to) = text.split_once("..")?;
-        Part::new(share(from)?, share(to)?)
+        let (from, to) = (share(from)?, share(to)?);
+        (0.0 <= from && from < to && to <= 1.0).then_some(from..to)
     };
     match text {
-        "all" => Ok(Part::ALL),
+        "all" => Ok(0.0..1.0),
         _ => range().ok_or_else(|| {
             "`all` or a range of percent from 0..100 is needed, as in 0..50".to_owned()
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_is_a_range_of_percent() {
+        assert_eq!((part("all"), part("0..50")), (Ok(0.0..1.0), Ok(0.0..0.5)));
+        for text in ["50..50", "60..50", "-10..50", "0..110", "nan..100", "50"] {
+            assert!(part(text).is_err(), "{text}");
+        }
     }
 }

@@ -14,6 +14,8 @@ use serde::de::DeserializeOwned;
 
 /// An object is visible if its strongest echo reaches this many counts, the threshold of the masks.
 const SEEN_COUNTS: f64 = 60.0;
+/// The largest table, bytes.
+const MAX_BYTES: u64 = 4 << 30;
 
 #[derive(Deserialize)]
 struct TrackedRow {
@@ -94,12 +96,13 @@ pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
     Ok(object_errors(&scans))
 }
 
-fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
-    let file = gyre_storage::open(path)
+/// Reads a table as CSV by the names of its columns.
+pub fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
+    let text = gyre_storage::read_text(path, MAX_BYTES)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        .from_reader(file);
+        .from_reader(text.as_bytes());
     let rows: Result<Vec<T>, csv::Error> = reader.deserialize().collect();
     rows.map_err(|error| format!("{}: {error}", path.display()).into())
 }

@@ -1,9 +1,6 @@
 //! Reads `odometry.csv` back, by the names in its header: other columns may be added or removed.
 
-use std::{
-    io::{self, BufReader, Read},
-    path::Path,
-};
+use std::path::Path;
 
 use gyre_evaluation::TimedMotion;
 use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
@@ -31,48 +28,21 @@ struct MotionRow {
     scale_sigma: Option<f64>,
 }
 
+/// The largest file, bytes: a month at 10 Hz has 9 GB.
+const MAX_BYTES: u64 = 16 << 30;
+
 /// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion
 /// has none.
 pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
-    let file = gyre_storage::open(path)
+    let text = gyre_storage::read_text(path, MAX_BYTES)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    let lines = ShortLines {
-        text: BufReader::new(file),
-        line: 0,
-    };
-    parse(lines).map_err(|reason| format!("{}: {reason}", path.display()).into())
+    parse(&text).map_err(|reason| format!("{}: {reason}", path.display()).into())
 }
 
-/// The longest line, bytes: several times the length of a full row.
-const LONGEST_LINE: usize = 1 << 16;
-
-/// Refuses a line without end, which would be kept in memory.
-struct ShortLines<R> {
-    text: R,
-    line: usize,
-}
-
-impl<R: Read> Read for ShortLines<R> {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let count = self.text.read(bytes)?;
-        for part in bytes[..count].split_inclusive(|byte| *byte == b'\n') {
-            self.line += part.len();
-            if self.line > LONGEST_LINE {
-                let reason = format!("it has a line of more than {LONGEST_LINE} bytes");
-                return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
-            }
-            if part.ends_with(b"\n") {
-                self.line = 0;
-            }
-        }
-        Ok(count)
-    }
-}
-
-fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
+fn parse(text: &str) -> Result<Vec<TimedMotion>, Failure> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        .from_reader(text);
+        .from_reader(text.as_bytes());
     let header = reader.headers()?;
     let missing = |name: &&str| header.iter().all(|column| column != *name);
     if let Some(name) = COLUMNS.split(' ').find(missing) {
@@ -113,7 +83,9 @@ impl MotionRow {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_messages::{Item, MotionEstimate, PoseHeader};
+    use gyre_messages::{
+        Item, MotionEstimate, PoseHeader, RefinementRecord, initial_guess, outcome,
+    };
 
     use super::*;
     use crate::odometry::{HEADER, motion, write_row};
@@ -142,6 +114,12 @@ mod tests {
                 drift_share: 0.25,
                 scale_sigma: 0.01,
                 interval_ns: 250_000_000,
+                refinement: RefinementRecord {
+                    outcome: outcome::REFINED,
+                    initial_guess: initial_guess::YAW_OFFSET,
+                    stationary: 1,
+                    ..RefinementRecord::default()
+                },
                 ..MotionEstimate::default()
             },
             ..PoseHeader::default()
@@ -152,15 +130,17 @@ mod tests {
     #[test]
     fn what_was_written_is_read_whatever_columns_are_beside_it() {
         let (poses, text) = (poses(), csv(&poses()));
-        assert_eq!(parse(text.as_bytes()).unwrap(), motions(&poses));
+        assert!(text.contains(",refined,yaw-offset,"));
+        assert!(text.ends_with(",1,0.250000000,0.010000000\n"));
+        assert_eq!(parse(&text).unwrap(), motions(&poses));
         let wider = text.lines().map(|line| format!("new,{line},newer\n"));
         let wider: String = wider.collect();
-        assert_eq!(parse(wider.as_bytes()).unwrap(), motions(&poses));
+        assert_eq!(parse(&wider).unwrap(), motions(&poses));
     }
 
     #[test]
     fn an_empty_covariance_is_none_and_the_motion_stays() {
-        let read = parse(csv(&poses()).replace("0.040000000000", "").as_bytes()).unwrap();
+        let read = parse(&csv(&poses()).replace("0.040000000000", "")).unwrap();
         assert_eq!(read.len(), 3);
         assert!(read[0].estimate.motion == motions(&poses())[0].estimate.motion);
         assert!(!read[0].estimate.alone().has_covariance());
@@ -169,7 +149,7 @@ mod tests {
     #[test]
     fn an_interval_before_the_beginning_of_time_is_refused() {
         let text = csv(&poses()).replace(",250000000,", ",-9223372036854775808,");
-        let refused = parse(text.as_bytes()).unwrap_err().to_string();
+        let refused = parse(&text).unwrap_err().to_string();
         assert!(refused.contains("interval_ns"), "{refused}");
     }
 }

@@ -57,16 +57,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_files_of_others_that_a_run_would_replace_are_known() {
-        let folder = tempfile::tempdir().unwrap();
-        for name in FILES {
-            fs::write(folder.path().join(name), "mine").unwrap();
-            assert!(Out::lock(folder.path()).is_err(), "{name}");
-            fs::remove_file(folder.path().join(name)).unwrap();
-        }
-    }
-
-    #[test]
     fn a_result_that_is_not_made_again_is_removed_and_other_files_stay() {
         let folder = tempfile::tempdir().unwrap();
         let out = Out::lock(folder.path()).unwrap();

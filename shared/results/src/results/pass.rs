@@ -1,13 +1,15 @@
 //! One pass over the journal.
 
 use gyre_datasets::ground_truth::write_tum_pose;
+use gyre_evaluation::TimedMotion;
+use gyre_geometry::Pose;
 use gyre_messages::{Item, PoseHeader, flag};
 use gyre_radar::Trajectory;
 use gyre_run::latency::LatencyMeter;
 use gyre_storage::Draft;
 use gyre_terminal::Failure;
 
-use super::{Estimate, Files, Slam, sketch::Sketch};
+use super::{Files, Slam, sketch::Sketch};
 use crate::{odometry, poses, summary::Counter};
 
 /// Writes the tables row by row, and measures and counts all else.
@@ -33,7 +35,9 @@ pub struct Read {
     /// different clock.
     pub latency: LatencyMeter,
     pub sketch: Sketch,
-    pub estimate: Estimate,
+    /// The poses and motions to judge, half a kilobyte for each pose; else empty.
+    pub trajectory: Trajectory,
+    pub motions: Vec<TimedMotion>,
     pub corrected: Trajectory,
     pub corrected_sketch: Sketch,
 }
@@ -88,7 +92,8 @@ impl<'a, 'b> Pass<'a, 'b> {
             None => self.read.latency.add(pose),
         }
         if self.is_judged {
-            self.read.estimate.add(pose);
+            push(&mut self.read.trajectory, pose.item.stamp_ns, place);
+            self.read.motions.extend(odometry::motion(pose));
         }
         Ok(())
     }
@@ -103,9 +108,7 @@ impl<'a, 'b> Pass<'a, 'b> {
         write_tum_pose(stamp_ns, &corrected, &mut line)?;
         self.read.corrected_sketch.add(corrected);
         if self.is_judged {
-            let trajectory = &mut self.read.corrected;
-            trajectory.stamp_ns.get_or_insert_default().push(stamp_ns);
-            trajectory.poses.push(corrected);
+            push(&mut self.read.corrected, stamp_ns, corrected);
         }
         Ok(tum.append(line)?)
     }
@@ -119,4 +122,9 @@ impl<'a, 'b> Pass<'a, 'b> {
         }
         self.read
     }
+}
+
+fn push(trajectory: &mut Trajectory, stamp_ns: i64, pose: Pose) {
+    trajectory.stamp_ns.get_or_insert_default().push(stamp_ns);
+    trajectory.poses.push(pose);
 }

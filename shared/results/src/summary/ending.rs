@@ -14,11 +14,10 @@ impl Summary {
     /// Returns a line each for the path, its accuracy, the latency, unusual events and the files;
     /// with SLAM one for the loops, and one for a problem.
     pub fn in_brief(&self) -> String {
-        let problem = self.problem.as_ref().map(ToString::to_string);
         let unusual = all_unusual(&self.figures());
         let lines = [
             (self.ending_word(), Some(self.path())),
-            ("problem", problem),
+            ("problem", self.problem.clone()),
             ("accuracy", Some(self.accuracy())),
             ("loops", self.loops()),
             ("latency", Some(self.pace())),
@@ -127,7 +126,7 @@ mod tests {
 
     use super::*;
     use crate::summary::{
-        Counts, Course, Measured, Problem, Session, SlamSummary,
+        Counts, Course, HARDLY_MEASURED, Measured, Session, SlamSummary,
         counts::{GyroCounts, MotionCounts, WheelCounts},
     };
 
@@ -244,7 +243,7 @@ look at     gyre report out/radiate --open; all figures:
             problem.unwrap_or_default()
         };
         assert_eq!(problem(93, 40, 200, 1.03, -0.11), "");
-        assert!(problem(94, 0, 0, 1.0, 0.0).contains(Problem::OF_MOTIONS));
+        assert!(problem(94, 0, 0, 1.0, 0.0).contains(HARDLY_MEASURED));
         assert!(problem(0, 41, 0, 1.0, 0.0).contains("41 of its 400 turns"));
         assert!(problem(0, 0, 201, 1.0, 0.0).contains("201 of their 400"));
         assert!(problem(0, 0, 0, 1.05, 0.0).contains("`gyro.scale` or"));

@@ -1,6 +1,6 @@
 //! The part of the summary about GNSS.
 
-use gyre_datasets::{GnssFaults, GnssLog};
+use gyre_datasets::GnssLog;
 use gyre_estimation::EstimationError;
 use gyre_geometry::{UncertainMotion, xy_yaw};
 use gyre_mapping::Origin;
@@ -13,38 +13,11 @@ const LEAST_WEIGHT: f64 = 0.25;
 
 #[derive(Debug, Serialize)]
 pub struct GnssSummary {
-    log: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    topic: Option<String>,
-    fixes: usize,
-    faults: GnssFaults,
-    /// Fixes before the first keyframe or after the last.
-    outside: usize,
-    /// Fixes that are farther from their keyframe than a different fix.
-    thinned: usize,
-    /// Fixes too far from a keyframe for odometry to predict the place of the vehicle.
-    far: usize,
-    used: usize,
-    /// Fixes that contradict the others, the odometry or the loops.
-    refused: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// The figures without those that are not known.
+    #[serde(flatten)]
+    figures: Value,
+    #[serde(skip)]
     refusal: Option<String>,
-    /// Delay of the fixes, estimated from their speeds, beyond `gnss.delay_s`, s; `None` if the
-    /// drive does not determine it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    delay_s: Option<f64>,
-    /// Root mean square of the distances of the used fixes from the corrected trajectory, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    residual_rms_m: Option<f64>,
-    /// The pose of the frame of `trajectory_slam.tum` in the plane of the fixes.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    east_north: Option<Value>,
-    /// Where that plane touches the earth: latitude and longitude (WGS 84), degrees.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    plane: Option<[f64; 2]>,
-    /// The place of the frame of `trajectory_slam.tum` on the earth.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    origin: Option<Origin>,
 }
 
 /// Returns a pose in the plane of the fixes with its standard deviations; the direction of the x
@@ -83,26 +56,38 @@ impl GnssSummary {
         let fixes = estimator.fixes();
         let counts = fixes.counts();
         let refusal = || fixes.refusal().map(ToString::to_string);
-        Ok(Self {
-            log: log.path.display().to_string(),
-            topic: log.topic.clone(),
-            fixes: log.fixes.len(),
-            faults: log.faults.clone(),
-            outside: counts.outside,
-            thinned: counts.thinned,
-            far: counts.far,
-            used: squares.len(),
-            refused: counts.taken - squares.len(),
-            refusal: log.unusable.clone().or_else(refusal),
-            delay_s: fixes.clock().map(|clock| clock.delay_s),
-            residual_rms_m: (!squares.is_empty()).then_some(rms_m),
-            east_north: frame.as_ref().map(east_north),
-            plane: log.plane.map(|plane| {
-                let origin = plane.origin();
-                [origin.latitude_deg, origin.longitude_deg]
-            }),
-            origin,
-        })
+        let refusal = log.unusable.clone().or_else(refusal);
+        let plane = log.plane.map(|plane| plane.origin());
+        let mut figures = json!({
+            "log": log.path.display().to_string(),
+            "topic": log.topic,
+            "fixes": log.fixes.len(),
+            "faults": log.faults,
+            // Before the first keyframe or after the last.
+            "outside": counts.outside,
+            // Farther from their keyframe than a different fix.
+            "thinned": counts.thinned,
+            // Too far from a keyframe for odometry to predict the place of the vehicle.
+            "far": counts.far,
+            "used": squares.len(),
+            // They contradict the others, the odometry or the loops.
+            "refused": counts.taken - squares.len(),
+            "refusal": refusal,
+            // Estimated from their speeds, beyond `gnss.delay_s`.
+            "delay_s": fixes.clock().map(|clock| clock.delay_s),
+            // From the corrected trajectory.
+            "residual_rms_m": (!squares.is_empty()).then_some(rms_m),
+            // The pose of the frame of `trajectory_slam.tum` in the plane of the fixes.
+            "east_north": frame.as_ref().map(east_north),
+            // Where that plane touches the earth: latitude and longitude (WGS 84), degrees.
+            "plane": plane.map(|it| [it.latitude_deg, it.longitude_deg]),
+            // The place of that frame on the earth.
+            "origin": origin,
+        });
+        if let Some(figures) = figures.as_object_mut() {
+            figures.retain(|_, figure| !figure.is_null());
+        }
+        Ok(Self { figures, refusal })
     }
 
     /// Returns why no fix is used, and whether that is a problem: of a vehicle that hardly moved it

@@ -74,8 +74,11 @@ impl Inputs {
     }
 }
 
-/// Prints the place of the files of a configuration if that is not clear.
-pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration, Failure> {
+/// Reads a configuration, or the defaults. Prints the place of its files if that is not clear.
+pub fn configuration(named: Option<&Path>, overrides: &[String]) -> Result<Configuration, Failure> {
+    let Some(named) = named else {
+        return Ok(Configuration::of_overrides(overrides)?);
+    };
     let (configuration, notes) = Configuration::named(named, overrides)?;
     let notes = notes.iter();
     notes.for_each(|note| print::note(format_args!("gyre: {note}")));
@@ -86,13 +89,12 @@ impl Given {
     /// Reads the named configuration, or finds and prints the settings of the recording.
     pub fn read(&self, overrides: &[String]) -> Result<Configuration, Failure> {
         match (&self.configuration, &self.data) {
-            (Some(named), _) => configuration(named, overrides),
             (None, Some(data)) => {
                 let (configuration, sentence) = Configuration::of_recording(data, overrides)?;
                 print::note(sentence);
                 Ok(configuration)
             }
-            (None, None) => Ok(Configuration::of_overrides(overrides)?),
+            (named, _) => configuration(named.as_deref(), overrides),
         }
     }
 

@@ -3,8 +3,6 @@
 use gyre_slam::localisation::Status;
 use serde::Serialize;
 
-use super::RegisteredScan;
-
 /// Spans without a fix that are listed.
 const LISTED: usize = 10;
 
@@ -26,12 +24,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    pub fn add(&mut self, scan: &RegisteredScan<'_>, status: Status) {
-        let stamp_ns = scan.observation.stamp_ns;
-        self.count(scan.number, stamp_ns, status);
-    }
-
-    fn count(&mut self, number: usize, stamp_ns: i64, status: Status) {
+    pub fn add(&mut self, number: usize, stamp_ns: i64, status: Status) {
         let first_ns = *self.first_ns.get_or_insert(stamp_ns);
         match status {
             Status::Found => self.found += 1,
@@ -99,7 +92,7 @@ mod tests {
     fn counts(statuses: &[Status]) -> Counts {
         let mut counts = Counts::default();
         for (number, status) in statuses.iter().enumerate() {
-            counts.count(number, number as i64 * 250_000_000, *status);
+            counts.add(number, number as i64 * 250_000_000, *status);
         }
         counts
     }

@@ -16,7 +16,13 @@ const BETWEEN_DRIVES_M: f64 = 1e3;
 
 pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> {
     let (run, out) = (&arguments.run, &arguments.out);
-    require_another_folder(map, out)?;
+    if out.exists() && fs::canonicalize(map).ok() == fs::canonicalize(out).ok() {
+        let map = map.display();
+        return Err(format!(
+            "--out is the map {map} itself: choose another folder, so that it is kept"
+        )
+        .into());
+    }
     let mut keyframes = super::open(run)?;
     let graph = placing::read_graph(run, keyframes.len())?;
     let mut localiser = searched_map::open(map, &super::configuration(run)?)?;
@@ -65,16 +71,4 @@ fn all(
         all.push(keyframe);
     }
     Ok(all)
-}
-
-fn require_another_folder(map: &Path, out: &Path) -> Result<(), Failure> {
-    let same = fs::canonicalize(map).ok() == fs::canonicalize(out).ok() && out.exists();
-    let map = map.display();
-    match same {
-        true => Err(format!(
-            "--out is the map {map} itself: choose another folder, so that it is kept"
-        )
-        .into()),
-        false => Ok(()),
-    }
 }

@@ -2,12 +2,10 @@
 
 use std::path::Path;
 
+use gyre_results::evaluate::rows;
 use gyre_slam::LoopVerdict;
 use gyre_terminal::Failure;
 use serde::Deserialize;
-
-/// The largest file, bytes: three rows a keyframe of a drive of 1,000 km.
-const MAX_BYTES: u64 = 1 << 28;
 
 #[derive(Deserialize)]
 struct LoopRow {
@@ -21,16 +19,10 @@ pub fn used_loops(path: &Path) -> Result<Vec<[u64; 2]>, Failure> {
     if !super::exists(path)? {
         return Ok(Vec::new());
     }
-    let text = gyre_storage::read_text(path, MAX_BYTES)
-        .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    let used_verdict = LoopVerdict::Used.to_string();
-    let rows = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
-    let used = rows.filter_map(|row: Result<LoopRow, csv::Error>| match row {
-        Ok(row) if row.verdict != used_verdict => None,
-        row => Some(row.map(|row| [row.found_scan, row.scan])),
-    });
-    let used: Result<Vec<_>, _> = used.collect();
-    Ok(used.map_err(|error| format!("{}: {error}", path.display()))?)
+    let used = LoopVerdict::Used.to_string();
+    let rows = rows::<LoopRow>(path)?.into_iter();
+    let rows = rows.filter(|row| row.verdict == used);
+    Ok(rows.map(|row| [row.found_scan, row.scan]).collect())
 }
 
 #[cfg(test)]

@@ -58,7 +58,7 @@ impl Clients {
     /// Sends bytes to the clients that have asked for azimuths, and drops those that fail.
     pub fn send(&self, bytes: &[u8]) {
         lock(&self.all).retain_mut(|client| {
-            let takes = !client.started || write_in_time(&mut client.stream, bytes).is_ok();
+            let takes = !client.started || client.stream.write_all(bytes).is_ok();
             if !takes {
                 let _ = client.stream.shutdown(Shutdown::Both);
             }
@@ -83,19 +83,6 @@ impl Clients {
             while began.elapsed() < LINGER && matches!(client.stream.read(&mut rest), Ok(1..)) {}
         }
     }
-}
-
-/// Writes a message, however slowly it is taken, within [`WRITE_TIMEOUT`].
-fn write_in_time(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
-    let began = Instant::now();
-    while !bytes.is_empty() {
-        let written = stream.write(bytes)?;
-        if written == 0 || began.elapsed() > WRITE_TIMEOUT {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        bytes = &bytes[written..];
-    }
-    Ok(())
 }
 
 /// Sends the configuration to a client, and reads its requests in a thread.

@@ -61,9 +61,8 @@ pub struct DatasetOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f32>,
     /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed, see
-    /// [`SweepGeometry::doppler_s`](gyre_radar::SweepGeometry::doppler_s). About 0.04 for older
-    /// Navtech radars (negative for falling chirps), 0.049 for those with alternating chirps.
-    /// Default: 0, unknown.
+    /// `SweepGeometry::doppler_s`. About 0.04 for older Navtech radars (negative for falling
+    /// chirps), 0.049 for those with alternating chirps. Default: 0, unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doppler_s: Option<f32>,
     /// Eccentricity of the encoder, rad: the true azimuth is the encoder's plus this times its

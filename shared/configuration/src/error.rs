@@ -1,7 +1,0 @@
-//! Errors of configurations.
-
-use thiserror::Error;
-
-#[derive(Debug, Error)]
-#[error("{0}")]
-pub struct ConfigurationError(pub String);
