@@ -2,10 +2,7 @@
 
 use std::{
     collections::VecDeque,
-    sync::{
-        Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-    },
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use axum::extract::ws::Message;
@@ -39,7 +36,6 @@ pub struct RunView {
     state: Mutex<ViewState>,
     /// The newest pictures and reports. A slow browser receives the newest, and not those between.
     pub updates: Updates,
-    wanted: [AtomicUsize; 4],
     pub histograms: Histograms,
 }
 
@@ -296,19 +292,11 @@ impl RunView {
         self.state().latest.map(|latest| latest.stamp_ns)
     }
 
-    pub fn want(&self, layer: Layer, more: bool) {
-        let wanted = &self.wanted[layer as usize];
-        match more {
-            true => wanted.fetch_add(1, Ordering::Relaxed),
-            false => wanted.fetch_sub(1, Ordering::Relaxed),
-        };
-    }
-
     pub fn is_wanted(&self, layer: Layer) -> bool {
         if layer == Layer::Objects && !self.state().run.objects {
             return false;
         }
-        self.wanted[layer as usize].load(Ordering::Relaxed) > 0
+        self.updates.of(layer).receiver_count() > 0
     }
 
     pub fn stop(&self) {
@@ -419,7 +407,7 @@ mod tests {
     #[test]
     fn objects_are_wanted_of_a_run_that_has_them_and_have_places_velocities_and_sizes() {
         let view = RunView::new("out");
-        view.want(Layer::Objects, true);
+        let _browser = view.updates.of(Layer::Objects).subscribe();
         assert!(!view.is_wanted(Layer::Objects));
         view.update_run(|run| run.objects = true);
         assert!(view.is_wanted(Layer::Objects));
