@@ -16,7 +16,7 @@ use std::{
 
 use gyre_journal::{self as journal, loops::LoggedLoops};
 use gyre_messages::{
-    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
+    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Window, topic,
 };
 use gyre_run::LinkConfig;
 use gyre_stage::{
@@ -150,11 +150,11 @@ impl<'run> Sending<'run> {
         let manifest = run.manifest();
         let prefix = prefix(&options.link.name, &session.zid().to_string());
         let mut server = Server::new(session, &prefix, None);
-        let logs = Logs::of(manifest)?;
+        let poses = Arc::new(LogBuffer::of_poses(&manifest.out));
         let names = topics(&options.topics, manifest)?;
         let topics = names.iter().copied().map(|name| {
             let observer = run.observe_topic(name)?.ok_or_else(|| no_topic(name))?;
-            let buffer = logs.buffer(name, manifest);
+            let buffer = buffer(name, manifest, &poses)?;
             Ok(SentTopic {
                 name,
                 observer,
@@ -233,35 +233,27 @@ impl SentTopic<'_> {
     }
 }
 
-struct Logs {
-    poses: Arc<LogBuffer>,
-    /// `None` in a run without SLAM.
-    loops: Option<Arc<LogBuffer>>,
-}
-
-impl Logs {
-    fn of(manifest: &Manifest) -> Result<Self, LinkError> {
-        let open = || LoggedLoops::open(&manifest.out).map_err(StageError::from);
-        let loops = manifest.window.slam.then(open).transpose()?;
-        Ok(Self {
-            poses: Arc::new(LogBuffer::of_poses(&manifest.out)),
-            loops: loops.map(|loops| Arc::new(LogBuffer::of_loops(loops))),
-        })
-    }
-
-    fn buffer(&self, name: &str, manifest: &Manifest) -> Arc<dyn ReplayBuffer> {
-        let composed = match manifest.refines {
-            true => Refined::TOPIC,
-            false => Motion::TOPIC,
-        };
-        match (name, &self.loops) {
-            (Pose::TOPIC, _) => self.poses.clone(),
-            (Loop::TOPIC, Some(loops)) => loops.clone(),
-            _ if name == composed => Arc::new(MotionBuffer(self.poses.clone())),
-            _ if is_lossless(name) => Arc::new(MemoryBuffer::bounded(usize::MAX, MAX_BYTES)),
-            _ => Arc::new(MemoryBuffer::of(MAX_SCANS)),
+/// Returns the buffer of a topic. The poses are those of the run.
+fn buffer(
+    name: &str,
+    manifest: &Manifest,
+    poses: &Arc<LogBuffer>,
+) -> Result<Arc<dyn ReplayBuffer>, LinkError> {
+    let composed = match manifest.refines {
+        true => Refined::TOPIC,
+        false => Motion::TOPIC,
+    };
+    let buffer: Arc<dyn ReplayBuffer> = match name {
+        Pose::TOPIC => poses.clone(),
+        Loop::TOPIC => {
+            let loops = LoggedLoops::open(&manifest.out).map_err(StageError::from)?;
+            Arc::new(LogBuffer::of_loops(loops))
         }
-    }
+        _ if name == composed => Arc::new(MotionBuffer(poses.clone())),
+        _ if is_lossless(name) => Arc::new(MemoryBuffer::bounded(usize::MAX, MAX_BYTES)),
+        _ => Arc::new(MemoryBuffer::of(MAX_SCANS)),
+    };
+    Ok(buffer)
 }
 
 /// Returns whether no message of a topic may be missed: all but the large ones with payloads.
@@ -271,12 +263,11 @@ fn is_lossless(topic: &str) -> bool {
 
 /// Returns the topics to send; poses are among them, since the motions come with them.
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, LinkError> {
-    let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
-        Some(Sender::Follower(follower)) => follower.is_in(&manifest.window),
-        _ => *name != Refined::TOPIC || manifest.refines,
-    };
     let named: Vec<&str> = match named.is_empty() {
-        true => DEFAULT.into_iter().filter(has).collect(),
+        true => DEFAULT
+            .into_iter()
+            .filter(|name| manifest.has_topic(name))
+            .collect(),
         false => named.iter().map(String::as_str).collect(),
     };
     let mut topics = Vec::new();

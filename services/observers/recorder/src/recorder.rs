@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Message, Pose, Refined, Sender as PublishedBy, topic};
+use gyre_messages::{Message, Pose, topic};
 use gyre_recording::{LogTail, SplitWriter};
 use gyre_stage::{
     Manifest, StageError, clock, launch,
@@ -128,11 +128,8 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
 
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RecorderError> {
     if named.is_empty() {
-        let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
-            Some(PublishedBy::Follower(follower)) => follower.is_in(&manifest.window),
-            _ => *name != Refined::TOPIC || manifest.refines,
-        };
-        let topics = DEFAULT.into_iter().filter(has).chain([LOG, HEALTH]);
+        let topics = DEFAULT.into_iter().filter(|name| manifest.has_topic(name));
+        let topics = topics.chain([LOG, HEALTH]);
         return Ok(topics.map(str::to_owned).collect());
     }
     let is_other = |name: &&String| *name != LOG && *name != HEALTH && topic(name).is_none();

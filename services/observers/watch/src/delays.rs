@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use gyre_messages::{Item, StageId};
-use serde::Serialize;
+use serde_json::{Value, json};
 
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
@@ -26,36 +26,6 @@ struct DelaySample {
     delays_us: [Option<u32>; KINDS],
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Percentiles {
-    p50_ms: f64,
-    p99_ms: f64,
-}
-
-/// Median and maximum of one second, ms: it has too few poses for a percentile beyond.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct SecondDelays {
-    p50_ms: f64,
-    max_ms: f64,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct StageDelays {
-    stage: &'static str,
-    /// From the publication by the stage before to the start of the work.
-    hand_over: Percentiles,
-    work: Percentiles,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct DelayReport {
-    samples: usize,
-    sensor_to_pose: Percentiles,
-    stages: Vec<StageDelays>,
-    /// Sensor to pose in each second of the last minute, oldest first; `None` without a pose.
-    series: Vec<Option<SecondDelays>>,
-}
-
 impl Delays {
     pub fn add(&mut self, item: &Item) {
         let mut delays_us = [None; KINDS];
@@ -73,8 +43,10 @@ impl Delays {
         }
     }
 
-    /// Removes samples older than a minute, and returns the percentiles of the rest.
-    pub fn report(&mut self, now_ns: i64) -> DelayReport {
+    /// Removes samples older than a minute, and returns the percentiles of the rest, ms: of sensor to
+    /// pose, and of each stage the hand-over, from the publication by the stage before to the start
+    /// of the work, and the work.
+    pub fn report(&mut self, now_ns: i64) -> Value {
         let is_old = |sample: &DelaySample| sample.at_ns < now_ns - WINDOW_NS;
         while self.samples.front().is_some_and(is_old) {
             self.samples.pop_front();
@@ -82,26 +54,23 @@ impl Delays {
         let of_kind = |kind: usize| {
             let delays = self.samples.iter().filter_map(|it| it.delays_us[kind]);
             let [p50_ms, p99_ms] = at(delays.collect(), [0.5, 0.99])?;
-            Some(Percentiles { p50_ms, p99_ms })
+            Some(json!({"p50_ms": p50_ms, "p99_ms": p99_ms}))
         };
         let stages = StageId::ALL.into_iter().filter_map(|stage| {
             let [hand_over, work] = kinds(stage).map(of_kind);
-            Some(StageDelays {
-                stage: stage.name(),
-                hand_over: hand_over?,
-                work: work?,
-            })
+            Some(json!({"stage": stage.name(), "hand_over": hand_over?, "work": work?}))
         });
-        DelayReport {
-            samples: self.samples.len(),
-            sensor_to_pose: of_kind(0).unwrap_or_default(),
-            stages: stages.collect(),
-            series: self.series(now_ns),
-        }
+        json!({
+            "samples": self.samples.len(),
+            "sensor_to_pose": of_kind(0).unwrap_or(json!({"p50_ms": 0.0, "p99_ms": 0.0})),
+            "stages": stages.collect::<Vec<_>>(),
+            "series": self.series(now_ns),
+        })
     }
 
-    /// Returns the delays of each second; the last one is not over, and is left out.
-    fn series(&self, now_ns: i64) -> Vec<Option<SecondDelays>> {
+    /// Returns median and maximum of sensor to pose in each second, oldest first: a second has too
+    /// few poses for a percentile beyond. The last second is not over, and is left out.
+    fn series(&self, now_ns: i64) -> Vec<Option<Value>> {
         let steps = WINDOW_NS / STEP_NS;
         let mut of_step = vec![Vec::new(); steps as usize];
         let end = now_ns / STEP_NS;
@@ -113,7 +82,7 @@ impl Delays {
         }
         let second = |delays_us| {
             let [p50_ms, max_ms] = at(delays_us, [0.5, 1.0])?;
-            Some(SecondDelays { p50_ms, max_ms })
+            Some(json!({"p50_ms": p50_ms, "max_ms": max_ms}))
         };
         of_step.into_iter().map(second).collect()
     }
@@ -167,16 +136,18 @@ mod tests {
             delays.add(&pose(now_ns - second * STEP_NS, second));
         }
         let report = delays.report(now_ns);
-        assert_eq!(report.samples, 50);
-        assert_eq!(report.sensor_to_pose.p99_ms, 50.0);
-        assert_eq!(report.series.len(), 60);
-        assert_eq!(report.series.iter().flatten().count(), 50);
-        let newest = report.series.last().copied().flatten();
-        assert_eq!(newest.map(|it| (it.p50_ms, it.max_ms)), Some((1.0, 1.0)));
+        assert_eq!(report["samples"], 50);
+        assert_eq!(report["sensor_to_pose"]["p99_ms"], 50.0);
+        let series = |report: &Value| report["series"].as_array().cloned().unwrap_or_default();
+        let seconds = series(&report);
+        let seen = seconds.iter().filter(|second| !second.is_null());
+        assert_eq!((seconds.len(), seen.count()), (60, 50));
+        assert_eq!(seconds[59], json!({"p50_ms": 1.0, "max_ms": 1.0}));
         let later = delays.report(now_ns + 2 * WINDOW_NS);
-        assert_eq!((later.samples, later.series), (0, vec![None; 60]));
+        assert_eq!(later["samples"], 0);
+        assert_eq!(series(&later), vec![Value::Null; 60]);
         (0..10_000).for_each(|k| delays.add(&pose(k * 1_000_000, 1)));
-        assert_eq!(delays.report(10_000_000_000).samples, MAX_SAMPLES);
+        assert_eq!(delays.report(10_000_000_000)["samples"], MAX_SAMPLES);
     }
 
     #[test]
@@ -184,10 +155,14 @@ mod tests {
         let mut delays = Delays::default();
         delays.add(&pose(STEP_NS, 5));
         let report = delays.report(STEP_NS);
-        let names: Vec<_> = report.stages.iter().map(|stage| stage.stage).collect();
-        assert_eq!(names, ["masking", "pose-integration"]);
+        let [first, second] = [0, 1].map(|index| &report["stages"][index]);
+        assert_eq!(
+            [&first["stage"], &second["stage"]],
+            ["masking", "pose-integration"]
+        );
+        assert_eq!(report["stages"][2], Value::Null);
         // Published 0.7 ms after its receipt at -2 ms, received at -0.6 ms, begun 0.1 ms later.
-        assert_eq!(report.stages[1].hand_over.p50_ms, 0.8);
-        assert_eq!(report.stages[1].work.p50_ms, 0.5);
+        assert_eq!(second["hand_over"]["p50_ms"], 0.8);
+        assert_eq!(second["work"]["p50_ms"], 0.5);
     }
 }

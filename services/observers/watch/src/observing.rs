@@ -111,22 +111,14 @@ fn follow_poses(
     let mut scans = has_samples.then(|| run.observe::<Scan>().ok()).flatten();
     view.set_notice(None);
     while !view.is_stopping() {
-        let limit = match track.catch_up(|pose| view.add_to_track(pose)) {
-            true => Duration::ZERO,
-            false => POLL_INTERVAL,
-        };
-        match poses.next(limit)? {
+        match poses.next(POLL_INTERVAL)? {
             Next::Message(message, _) => {
                 let pose = message.header();
                 view.add_pose(pose);
                 track.see(pose, |pose| view.add_to_track(pose));
             }
             Next::Idle => {}
-            Next::Ended => {
-                // The remaining poses of the journal.
-                while !view.is_stopping() && track.catch_up(|pose| view.add_to_track(pose)) {}
-                break;
-            }
+            Next::Ended => break,
         }
         view.add_missed(Pose::TOPIC, poses.missed().saturating_sub(missed));
         missed = poses.missed();

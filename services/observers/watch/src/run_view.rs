@@ -18,7 +18,7 @@ use tokio::sync::watch;
 use crate::{
     delays::Delays,
     histograms::Histograms,
-    messages::{self, CurrentPose, HealthReport, Layer, RunCounts, RunInfo, RunState},
+    messages::{self, HealthReport, Layer, RunCounts, RunInfo, RunState},
     pictures::PackedPoints,
     processes::Process,
     recent_drift::RecentDrift,
@@ -61,7 +61,7 @@ struct ViewState {
     track: Track,
     drift: RecentDrift,
     delays: Delays,
-    latest: Option<CurrentPose>,
+    latest: Option<PoseHeader>,
     counts: RunCounts,
     last_motions: VecDeque<RefinementRecord>,
     rates: SampleRates,
@@ -147,13 +147,13 @@ impl RunView {
     pub fn add_pose(&self, pose: &PoseHeader) {
         let mut state = self.state();
         let state = &mut *state;
-        let has_pose = |latest: CurrentPose| latest.seq >= pose.item.seq;
+        let has_pose = |latest: PoseHeader| latest.item.seq >= pose.item.seq;
         if state.latest.is_some_and(has_pose) {
             return;
         }
         self.histograms.add(&pose.item);
         state.delays.add(&pose.item);
-        state.latest = Some(CurrentPose::of(pose));
+        state.latest = Some(*pose);
         state.counts.poses = pose.item.seq + 1;
         state.counts.dropped = pose.item.dropped();
         // The supervisor is asked once a second.
@@ -262,7 +262,7 @@ impl RunView {
     /// if there are no new poses.
     pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Message> {
         let state = self.state();
-        let seq = state.latest.map(|latest| latest.seq);
+        let seq = state.latest.map(|latest| latest.item.seq);
         let (vertices, replace) = state.track.since(cursor);
         if vertices.is_empty() && !replace && seq == *last {
             return None;
@@ -272,7 +272,7 @@ impl RunView {
             "kind": "poses",
             "replace": replace,
             "vertices": vertices,
-            "pose": state.latest,
+            "pose": state.latest.as_ref().map(messages::pose),
             "drift": state.drift.drift(),
         }))
     }
@@ -280,7 +280,7 @@ impl RunView {
     /// Returns the trajectory: x, y (m), yaw (rad).
     pub fn trajectory(&self) -> Vec<[f64; 3]> {
         let state = self.state();
-        let latest = state.latest.map(|latest| latest.vertex);
+        let latest = state.latest.as_ref().map(Vertex::of);
         let (vertices, _) = state.track.since(&mut Cursor::default());
         let vertices = vertices.iter().chain(&latest);
         let poses = vertices.map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw]);
@@ -289,7 +289,7 @@ impl RunView {
 
     /// Returns the time of the newest pose on the sensor's clock, ns.
     pub fn newest_stamp_ns(&self) -> Option<i64> {
-        self.state().latest.map(|latest| latest.stamp_ns)
+        self.state().latest.map(|latest| latest.item.stamp_ns)
     }
 
     pub fn is_wanted(&self, layer: Layer) -> bool {
