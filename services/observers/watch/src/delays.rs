@@ -8,61 +8,51 @@ use serde_json::{Value, json};
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
-/// The most samples: above 136 poses a second the window is shorter than a minute.
-const MAX_SAMPLES: usize = 8192;
-/// Delays of a pose: sensor to pose, then hand-over and work of each stage.
-const KINDS: usize = 1 + 2 * StageId::ALL.len();
+/// The most poses: above 136 a second the window is shorter than a minute.
+const MAX_POSES: usize = 8192;
 
 #[derive(Debug, Default)]
 pub struct Delays {
-    samples: VecDeque<DelaySample>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct DelaySample {
-    /// The end of the last work, `CLOCK_MONOTONIC`.
-    at_ns: i64,
-    /// In us; `None` where the run has no such stage.
-    delays_us: [Option<u32>; KINDS],
+    /// The items of poses, with their times by `CLOCK_MONOTONIC`.
+    poses: VecDeque<Item>,
 }
 
 impl Delays {
     pub fn add(&mut self, item: &Item) {
-        let mut delays_us = [None; KINDS];
-        delays_us[0] = Some(in_us(item.sensor_to_pose_ns()));
-        for times in item.hop_times() {
-            let [hand_over, work] = kinds(times.stage);
-            let waited_ns = times.transport_ns.unwrap_or(0) + times.wait_ns;
-            delays_us[hand_over] = Some(in_us(waited_ns));
-            delays_us[work] = Some(in_us(times.work_ns));
-        }
-        let at_ns = item.hops[StageId::PoseIntegration as usize].finished_ns;
-        self.samples.push_back(DelaySample { at_ns, delays_us });
-        if self.samples.len() > MAX_SAMPLES {
-            self.samples.pop_front();
+        self.poses.push_back(*item);
+        if self.poses.len() > MAX_POSES {
+            self.poses.pop_front();
         }
     }
 
-    /// Removes samples older than a minute, and returns the percentiles of the rest, ms: of sensor to
+    /// Removes poses older than a minute, and returns the percentiles of the rest, ms: of sensor to
     /// pose, and of each stage the hand-over, from the publication by the stage before to the start
     /// of the work, and the work.
     pub fn report(&mut self, now_ns: i64) -> Value {
-        let is_old = |sample: &DelaySample| sample.at_ns < now_ns - WINDOW_NS;
-        while self.samples.front().is_some_and(is_old) {
-            self.samples.pop_front();
+        let is_old = |item: &Item| finished_ns(item) < now_ns - WINDOW_NS;
+        while self.poses.front().is_some_and(is_old) {
+            self.poses.pop_front();
         }
-        let of_kind = |kind: usize| {
-            let delays = self.samples.iter().filter_map(|it| it.delays_us[kind]);
-            let [p50_ms, p99_ms] = at(delays.collect(), [0.5, 0.99])?;
+        let mut of_stages = StageId::ALL.map(|_| (Vec::new(), Vec::new()));
+        for times in self.poses.iter().flat_map(|item| item.hop_times()) {
+            let (hand_over, work) = &mut of_stages[times.stage as usize];
+            hand_over.push(times.transport_ns.unwrap_or(0) + times.wait_ns);
+            work.push(times.work_ns);
+        }
+        let percentiles = |delays_ns: Vec<i64>| {
+            let [p50_ms, p99_ms] = at(delays_ns, [0.5, 0.99])?;
             Some(json!({"p50_ms": p50_ms, "p99_ms": p99_ms}))
         };
-        let stages = StageId::ALL.into_iter().filter_map(|stage| {
-            let [hand_over, work] = kinds(stage).map(of_kind);
-            Some(json!({"stage": stage.name(), "hand_over": hand_over?, "work": work?}))
+        let stages = StageId::ALL.into_iter().zip(of_stages);
+        let stages = stages.filter_map(|(stage, (hand_over, work))| {
+            let (hand_over, work) = (percentiles(hand_over)?, percentiles(work)?);
+            Some(json!({"stage": stage.name(), "hand_over": hand_over, "work": work}))
         });
+        let sensor_to_pose = self.poses.iter().map(Item::sensor_to_pose_ns);
+        let none = || json!({"p50_ms": 0.0, "p99_ms": 0.0});
         json!({
-            "samples": self.samples.len(),
-            "sensor_to_pose": of_kind(0).unwrap_or(json!({"p50_ms": 0.0, "p99_ms": 0.0})),
+            "samples": self.poses.len(),
+            "sensor_to_pose": percentiles(sensor_to_pose.collect()).unwrap_or_else(none),
             "stages": stages.collect::<Vec<_>>(),
             "series": self.series(now_ns),
         })
@@ -74,34 +64,31 @@ impl Delays {
         let steps = WINDOW_NS / STEP_NS;
         let mut of_step = vec![Vec::new(); steps as usize];
         let end = now_ns / STEP_NS;
-        for sample in &self.samples {
-            let step = sample.at_ns / STEP_NS - (end - steps);
+        for item in &self.poses {
+            let step = finished_ns(item) / STEP_NS - (end - steps);
             if (0..steps).contains(&step) {
-                of_step[step as usize].extend(sample.delays_us[0]);
+                of_step[step as usize].push(item.sensor_to_pose_ns());
             }
         }
-        let second = |delays_us| {
-            let [p50_ms, max_ms] = at(delays_us, [0.5, 1.0])?;
+        let second = |delays_ns| {
+            let [p50_ms, max_ms] = at(delays_ns, [0.5, 1.0])?;
             Some(json!({"p50_ms": p50_ms, "max_ms": max_ms}))
         };
         of_step.into_iter().map(second).collect()
     }
 }
 
-fn kinds(stage: StageId) -> [usize; 2] {
-    let first = 1 + 2 * stage as usize;
-    [first, first + 1]
-}
-
-fn in_us(duration_ns: i64) -> u32 {
-    (duration_ns / 1000).clamp(0, u32::MAX.into()) as u32
+/// Returns the end of the last work on an item.
+fn finished_ns(item: &Item) -> i64 {
+    item.hops[StageId::PoseIntegration as usize].finished_ns
 }
 
 /// Returns the values at these shares of their order, ms; `None` of no values.
-fn at(mut delays_us: Vec<u32>, shares: [f64; 2]) -> Option<[f64; 2]> {
-    let last = delays_us.len().checked_sub(1)? as f64;
-    delays_us.sort_unstable();
-    Some(shares.map(|share| f64::from(delays_us[(last * share).round() as usize]) * 1e-3))
+fn at(mut delays_ns: Vec<i64>, shares: [f64; 2]) -> Option<[f64; 2]> {
+    let last = delays_ns.len().checked_sub(1)? as f64;
+    delays_ns.sort_unstable();
+    let delay_ns = |share: f64| delays_ns[(last * share).round() as usize].max(0);
+    Some(shares.map(|share| delay_ns(share) as f64 / 1e6))
 }
 
 #[cfg(test)]
@@ -147,7 +134,7 @@ mod tests {
         assert_eq!(later["samples"], 0);
         assert_eq!(series(&later), vec![Value::Null; 60]);
         (0..10_000).for_each(|k| delays.add(&pose(k * 1_000_000, 1)));
-        assert_eq!(delays.report(10_000_000_000)["samples"], MAX_SAMPLES);
+        assert_eq!(delays.report(10_000_000_000)["samples"], MAX_POSES);
     }
 
     #[test]

@@ -44,11 +44,11 @@ fn with_server(limits: Limits, test: impl AsyncFnOnce(SocketAddr)) {
     });
 }
 
-fn limits(request: Duration, answer: Duration) -> Limits {
+fn limits(request: Duration, answers: Duration) -> Limits {
     Limits {
         connections: 4,
         request,
-        answer,
+        answers,
     }
 }
 
