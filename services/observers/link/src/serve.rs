@@ -28,8 +28,6 @@ pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
-/// The most requests of a topic that are answered at once. A receiver has one of each topic.
-const MAX_REQUESTS: usize = 64;
 
 /// The answer that means that no message follows.
 pub(crate) const ENDED: &str = "ended";
@@ -60,7 +58,6 @@ pub(crate) struct Offer {
     answered: AtomicU64,
     /// The newest request of each receiver, which replaces those before.
     receivers: Mutex<BTreeMap<String, ReceiverState>>,
-    running: AtomicU64,
     messages: AtomicU64,
     bytes: AtomicU64,
     waker: Option<Waker>,
@@ -94,7 +91,6 @@ impl Server {
             asked: AtomicU64::new(0),
             answered: AtomicU64::new(0),
             receivers: Mutex::default(),
-            running: AtomicU64::new(0),
             messages: AtomicU64::new(0),
             bytes: AtomicU64::new(0),
             waker: self.waker.clone(),
@@ -150,16 +146,13 @@ impl Offer {
     /// Answers a request in a thread of its own, since sending waits while the network is slow.
     fn accept(self: Arc<Self>, query: Query) {
         let parameters = query.parameters();
-        let from = parameters.get(FROM).and_then(|from| from.parse().ok());
         let receiver = parameters.get(RECEIVER).unwrap_or_default().to_owned();
         if parameters.get(DONE).is_some() {
             self.replace(&receiver, true);
             let _ = query.reply_err(ENDED).wait();
             return;
         }
-        let running = self.running.fetch_add(1, Ordering::Relaxed);
-        let Some(from) = from.filter(|_| running < MAX_REQUESTS as u64) else {
-            self.running.fetch_sub(1, Ordering::Relaxed);
+        let Some(from) = parameters.get(FROM).and_then(|from| from.parse().ok()) else {
             return;
         };
         let place = Place {
@@ -171,16 +164,12 @@ impl Offer {
             waker.wake();
         }
         let request = self.replace(&receiver, false);
-        let answering = self.clone();
-        let spawned = thread::Builder::new().spawn(move || {
-            if let Err(error) = answering.answer(&query, place, &receiver, request) {
-                tracing::debug!("{}: {error}", answering.key);
+        // A receiver that is not answered asks again.
+        let _ = thread::Builder::new().spawn(move || {
+            if let Err(error) = self.answer(&query, place, &receiver, request) {
+                tracing::debug!("{}: {error}", self.key);
             }
-            answering.running.fetch_sub(1, Ordering::Relaxed);
         });
-        if spawned.is_err() {
-            self.running.fetch_sub(1, Ordering::Relaxed);
-        }
     }
 
     fn answer(

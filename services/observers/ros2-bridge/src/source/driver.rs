@@ -73,11 +73,8 @@ impl PacketMessage {
     }
 }
 
-enum Azimuths {
-    Azimuth(Subscription<RadarFftDataMsg>),
-    Bytes(Subscription<RadarFftDataMessage>),
-    Turn(Subscription<RadarBScanMsg>),
-}
+/// Takes the next message of the azimuths' topic, whatever its type.
+type TakePacket = Box<dyn Fn() -> Result<Option<Packet>, ReadError>>;
 
 pub struct Driver {
     node: Node,
@@ -87,7 +84,7 @@ pub struct Driver {
     configuration_dds_name: String,
     configurations: Subscription<RadarConfigurationMsg>,
     older: Subscription<RadarConfigurationMessage>,
-    azimuths: Option<Azimuths>,
+    azimuths: Option<TakePacket>,
     /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
     pub sample_wakeups: Wakeups,
     gyro: Option<Subscription<Imu>>,
@@ -154,11 +151,14 @@ impl Driver {
         let [azimuth, turn, _] = names();
         let (node, wakeups, topic) = (&mut self.node, &mut self.wakeups, &self.topic);
         self.azimuths = Some(if found == azimuth {
-            Azimuths::Azimuth(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
+            let topic = subscribe(node, wakeups, topic, AZIMUTHS, false)?;
+            take(topic, PacketMessage::Azimuth)
         } else if found == turn {
-            Azimuths::Turn(subscribe(node, wakeups, topic, TURNS, false)?)
+            let topic = subscribe(node, wakeups, topic, TURNS, false)?;
+            take(topic, PacketMessage::Turn)
         } else {
-            Azimuths::Bytes(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
+            let topic = subscribe(node, wakeups, topic, AZIMUTHS, false)?;
+            take(topic, PacketMessage::Bytes)
         });
         Ok(true)
     }
@@ -221,12 +221,7 @@ impl Driver {
     }
 
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
-        Ok(match &self.azimuths {
-            Some(Azimuths::Azimuth(topic)) => take(topic, PacketMessage::Azimuth)?,
-            Some(Azimuths::Bytes(topic)) => take(topic, PacketMessage::Bytes)?,
-            Some(Azimuths::Turn(topic)) => take(topic, PacketMessage::Turn)?,
-            None => None,
-        })
+        self.azimuths.as_ref().map_or(Ok(None), |take| take())
     }
 }
 
@@ -243,12 +238,14 @@ fn subscribe<M: Ros2Message + Send + 'static>(
 }
 
 fn take<M: Ros2Message + 'static>(
-    topic: &Subscription<M>,
+    topic: Subscription<M>,
     of: fn(M) -> PacketMessage,
-) -> Result<Option<Packet>, ReadError> {
-    let taken = topic.take()?;
-    Ok(taken.map(|(message, info)| Packet {
-        message: of(message),
-        publisher: info.publisher_gid(),
-    }))
+) -> TakePacket {
+    Box::new(move || {
+        let taken = topic.take()?;
+        Ok(taken.map(|(message, info)| Packet {
+            message: of(message),
+            publisher: info.publisher_gid(),
+        }))
+    })
 }
