@@ -302,7 +302,7 @@ impl Base<'_> {
         self.check_next(&item, &items)?;
         if item.is(flag::END) {
             // The base ends after the robot has all poses, the robot after the base has the end.
-            if to_robot.pose_offer.asked() < item.seq {
+            if to_robot.pose_offer.answered() < item.seq {
                 return Ok(false);
             }
             self.stages.end(item)?;

@@ -9,7 +9,7 @@ use thiserror::Error;
 ///
 /// By default zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which
 /// the connection does not allow (eclipse-zenoh/zenoh#2557): under load it breaks within seconds.
-/// Set it before the program starts; TLS is refused without.
+/// Set it before the program starts.
 pub const ONE_THREAD: (&str, &str) = (
     "ZENOH_RUNTIME",
     "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))",

@@ -52,9 +52,7 @@ pub(crate) struct Server {
 pub(crate) struct Offer {
     buffer: Arc<dyn ReplayBuffer>,
     key: String,
-    /// The highest number that was requested: all before it has arrived.
-    asked: AtomicU64,
-    /// As above, for the requests that have been answered.
+    /// The highest number of the requests that have been answered: all before it has arrived.
     answered: AtomicU64,
     /// The newest request of each receiver, which replaces those before.
     receivers: Mutex<BTreeMap<String, ReceiverState>>,
@@ -88,7 +86,6 @@ impl Server {
         let offer = Arc::new(Offer {
             buffer,
             key: format!("{}/{topic}", self.prefix),
-            asked: AtomicU64::new(0),
             answered: AtomicU64::new(0),
             receivers: Mutex::default(),
             messages: AtomicU64::new(0),
@@ -115,11 +112,8 @@ impl Drop for Server {
 }
 
 impl Offer {
-    pub fn asked(&self) -> u64 {
-        self.asked.load(Ordering::Relaxed)
-    }
-
-    /// Returns the same, as far as the receiver can know that it is known here.
+    /// Returns the number before which all has arrived, as far as the receiver can know that it is
+    /// known here.
     pub fn answered(&self) -> u64 {
         self.answered.load(Ordering::Relaxed)
     }
@@ -159,10 +153,6 @@ impl Offer {
             seq: from,
             generation: parameters.get(GENERATION).and_then(|it| it.parse().ok()),
         };
-        self.asked.fetch_max(from, Ordering::Relaxed);
-        if let Some(waker) = &self.waker {
-            waker.wake();
-        }
         let request = self.replace(&receiver, false);
         // A receiver that is not answered asks again.
         let _ = thread::Builder::new().spawn(move || {

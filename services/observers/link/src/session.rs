@@ -10,7 +10,7 @@ use gyre_run::LinkConfig;
 use serde_json::{Value, json};
 use zenoh::{Config, Session, Wait};
 
-use crate::{LinkError, ONE_THREAD, network::check};
+use crate::{LinkError, network::check};
 
 /// Time without a sign of life after which a connection is given up, ms. Messages wait meanwhile.
 const LEASE_MS: u64 = 3000;
@@ -26,7 +26,6 @@ pub(crate) fn open(
     mut pause: impl FnMut() -> Result<bool, LinkError>,
 ) -> Result<Option<Session>, LinkError> {
     check(link)?;
-    require_one_thread(link)?;
     let config = Config::from_json5(&settings(link).to_string())
         .map_err(|e| LinkError::zenoh("use the settings of the link", &e))?;
     let (sender, opened) = channel();
@@ -44,17 +43,6 @@ pub(crate) fn open(
             Err(TryRecvError::Empty) if pause()? => return Ok(None),
             Err(TryRecvError::Empty) => {}
         }
-    }
-}
-
-fn require_one_thread(link: &LinkConfig) -> Result<(), LinkError> {
-    let (name, value) = ONE_THREAD;
-    let is_set = std::env::var_os(name).is_some_and(|set| set == value);
-    match is_set || link.certificate.as_os_str().is_empty() {
-        true => Ok(()),
-        false => Err(LinkError::Refused(format!(
-            "TLS needs {name}='{value}' in the environment, which `gyre run` and `gyre link` set"
-        ))),
     }
 }
 
