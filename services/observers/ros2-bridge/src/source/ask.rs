@@ -12,8 +12,8 @@ use thiserror::Error;
 use super::{Settings, configuration_estimate::ConfigurationEstimate, driver::Driver};
 use crate::NodeError;
 
-/// The longest wait for the configuration, which the driver repeats every four turns, and for
-/// azimuths to estimate it from.
+/// The longest wait for the configuration, which the driver repeats every four turns. Meanwhile
+/// azimuths come, to estimate it from.
 const MAX_WAIT: Duration = Duration::from_secs(6);
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
@@ -39,11 +39,7 @@ impl From<NodeError> for AskError {
 
 /// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
-    let mut driver = Driver::open(settings)?;
-    let configuration = match published(&driver, settings)? {
-        Some(configuration) => configuration,
-        None => estimated(&mut driver, settings)?,
-    };
+    let configuration = configuration(settings)?;
     let assembler = SweepAssembler::new(&configuration, settings.constants);
     let assembler = assembler.map_err(|error| {
         let reason = format!("the radar on {} cannot be used: {error}", settings.topic);
@@ -55,26 +51,28 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     })
 }
 
-fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuration>, AskError> {
-    let started = Instant::now();
+/// Returns the configuration that the driver publishes, or the one that its azimuths show.
+fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
+    let mut driver = Driver::open(settings)?;
+    let (mut estimate, started) = (ConfigurationEstimate::default(), Instant::now());
     while started.elapsed() < MAX_WAIT {
-        driver.found()?;
+        driver.receive()?;
         if let Ok(Some(described)) = driver.configuration() {
-            return Ok(Some(described.radar));
+            return Ok(described.radar);
+        }
+        while let Ok(Some(packet)) = driver.packet() {
+            estimate.add_message(&packet.message, packet.message.arrival_ns());
         }
         sleep(POLL_INTERVAL);
     }
-    if driver.found()?.is_some() {
-        return Ok(None);
+    let topic = &settings.topic;
+    if driver.found()?.is_none() {
+        let domain = settings.domain.id();
+        let reason = format!(
+            "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
+        );
+        return Err(AskError::of(reason, true));
     }
-    let (topic, domain) = (&settings.topic, settings.domain.id());
-    let reason = format!(
-        "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
-    );
-    Err(AskError::of(reason, true))
-}
-
-fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, AskError> {
     let Some(resolution_m) = settings.constants.range_resolution_m else {
         let topic = settings.configuration_topic();
         let reason = format!(
@@ -82,20 +80,11 @@ fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, 
         );
         return Err(AskError::of(reason, false));
     };
-    let (mut estimate, started) = (ConfigurationEstimate::default(), Instant::now());
-    while started.elapsed() < MAX_WAIT {
-        driver.receive()?;
-        while let Ok(Some(packet)) = driver.packet() {
-            estimate.add_message(&packet.message, packet.message.arrival_ns());
-        }
-        if let Some(found) = estimate.configuration(settings.encoder_counts, resolution_m) {
-            return Ok(found);
-        }
-        sleep(POLL_INTERVAL);
-    }
-    let reason = format!(
-        "the driver publishes {}, but no azimuth arrives: check that the radar is on and in reach of its driver",
-        settings.topic
-    );
-    Err(AskError::of(reason, true))
+    let found = estimate.configuration(settings.encoder_counts, resolution_m);
+    found.ok_or_else(|| {
+        let reason = format!(
+            "the driver publishes {topic}, but no azimuth arrives: check that the radar is on and in reach of its driver"
+        );
+        AskError::of(reason, true)
+    })
 }
