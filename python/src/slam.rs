@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use gyre_estimation::EstimationError;
 use gyre_geometry::{Pose, SparsePoint, UncertainMotion};
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, SUBMAP_REACH_M, ScanPose,
+    ClosingError, Keyframe, KeyframeBuilder, LoopCloser, SUBMAP_REACH_M, ScanPose,
     TrajectoryEstimator,
 };
 use pyo3::prelude::*;
@@ -52,22 +52,12 @@ struct State {
     builder: KeyframeBuilder,
     closer: LoopCloser,
     estimator: TrajectoryEstimator,
-    keyframes: Keyframes,
+    /// With their points.
+    keyframes: Vec<Keyframe>,
     /// The poses of all scans by odometry.
     odometry: gyre_radar::Trajectory,
     is_finished: bool,
     is_solved: bool,
-}
-
-/// The keyframes with their points.
-struct Keyframes(Vec<Keyframe>);
-
-impl KeyframeSource for Keyframes {
-    type Error = Infallible;
-
-    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
-        Ok(self.0[index].clone())
-    }
 }
 
 #[derive(Debug, Error)]
@@ -109,7 +99,7 @@ impl State {
         keyframe.points = points();
         self.closer.push(&keyframe)?;
         self.estimator.push(&keyframe)?;
-        self.keyframes.0.push(keyframe);
+        self.keyframes.push(keyframe);
         self.is_solved = false;
         self.close()?;
         Ok(true)
@@ -142,7 +132,7 @@ impl State {
 
     fn loops(&mut self) -> Result<Vec<Loop>, SlamError> {
         self.solve()?;
-        let seq = |keyframe: usize| self.keyframes.0[keyframe].seq;
+        let seq = |keyframe: usize| self.keyframes[keyframe].seq;
         let judged = self.estimator.loops().iter().map(|judged| Loop {
             earlier: seq(judged.constraint.from),
             later: seq(judged.constraint.to),
@@ -184,7 +174,7 @@ impl Slam {
             builder: KeyframeBuilder::default(),
             closer: closer.map_err(errors::config)?,
             estimator: TrajectoryEstimator::new(kind),
-            keyframes: Keyframes(Vec::new()),
+            keyframes: Vec::new(),
             odometry: gyre_radar::Trajectory::default(),
             is_finished: false,
             is_solved: true,

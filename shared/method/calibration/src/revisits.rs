@@ -1,11 +1,7 @@
 //! Places of the drive that are seen again.
 
-use std::convert::Infallible;
-
 use gyre_geometry::{OdometryMotion, Pose, UncertainMotion};
-use gyre_slam::{
-    ClosingError, Keyframe, KeyframeBuilder, KeyframeSource, LoopCloser, SUBMAP_REACH_M, ScanPose,
-};
+use gyre_slam::{ClosingError, Keyframe, KeyframeBuilder, LoopCloser, SUBMAP_REACH_M, ScanPose};
 
 use crate::{CalibrationError, Drive, Track};
 
@@ -17,32 +13,21 @@ pub struct Revisit {
     pub pose: Pose,
 }
 
-struct Keyframes(Vec<Keyframe>);
-
-impl KeyframeSource for &Keyframes {
-    type Error = Infallible;
-
-    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
-        Ok(self.0[index].clone())
-    }
-}
-
 pub fn find(drive: &Drive, track: &Track) -> Result<Vec<Revisit>, CalibrationError> {
-    let keyframes = Keyframes(keyframes(drive, track));
+    let mut keyframes = keyframes(drive, track);
     let config = drive.config();
     let mut closer = LoopCloser::new(SUBMAP_REACH_M, &config.refinement, config.points.capacity)?;
-    for keyframe in &keyframes.0 {
+    for keyframe in &keyframes {
         closer.push(keyframe).map_err(ClosingError::from)?;
     }
     closer.finish();
-    let mut source = &keyframes;
-    while closer.describe(&mut source)?.is_some() {}
+    while closer.describe(&mut keyframes)?.is_some() {}
     let mut found = Vec::new();
-    while let Some(query) = closer.close(&mut source)? {
+    while let Some(query) = closer.close(&mut keyframes)? {
         for (candidate, _) in query.loops() {
             found.push(Revisit {
-                later: keyframes.0[query.keyframe].seq as usize,
-                earlier: keyframes.0[candidate.place].seq as usize,
+                later: keyframes[query.keyframe].seq as usize,
+                earlier: keyframes[candidate.place].seq as usize,
                 pose: candidate.motion.motion,
             });
         }

@@ -3,6 +3,8 @@
 
 mod cache;
 
+use std::convert::Infallible;
+
 use gyre_estimation::places::{
     Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
     neighbours,
@@ -23,6 +25,14 @@ pub trait KeyframeSource {
 
     /// Reads a keyframe that was given to [`LoopCloser::push`].
     fn keyframe(&mut self, index: usize) -> Result<Keyframe, Self::Error>;
+}
+
+impl KeyframeSource for Vec<Keyframe> {
+    type Error = Infallible;
+
+    fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
+        Ok(self[index].clone())
+    }
 }
 
 /// Length of the path between a keyframe and the earlier ones that it is compared with, at least,
