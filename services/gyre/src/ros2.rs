@@ -8,4 +8,4 @@ mod build;
 #[path = "ros2/absent.rs"]
 mod build;
 
-pub use build::{ask, may_come, publish, receive};
+pub use build::{ask, publish, receive};

@@ -18,7 +18,7 @@ use gyre_stages::live_radar::{AskError, Sizes};
 use gyre_supervise::wait;
 use gyre_terminal::{Failure, print};
 
-use crate::{notify::Notifier, preflight::ask, ros2};
+use crate::{notify::Notifier, preflight::ask};
 
 const PAUSE: Duration = Duration::from_secs(1);
 /// Time between two reports that the radar is waited for.
@@ -26,7 +26,7 @@ const REPORT_EVERY: Duration = Duration::from_secs(60);
 
 fn may_come(error: &Failure) -> bool {
     let radar = error.downcast_ref::<AskError>();
-    radar.is_some_and(AskError::may_pass) || ros2::may_come(error)
+    radar.is_some_and(AskError::may_pass)
 }
 
 fn notice(error: &Failure) -> String {

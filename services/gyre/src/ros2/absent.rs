@@ -20,10 +20,6 @@ pub fn ask(_: &SourceConfig, _: &DatasetOptions) -> Result<Sizes, Failure> {
     Err(absent(PART).into())
 }
 
-pub fn may_come(_: &Failure) -> bool {
-    false
-}
-
 pub fn receive(
     _: &Launch,
     _: &SourceConfig,

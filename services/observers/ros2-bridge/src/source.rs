@@ -17,7 +17,7 @@ use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, Whe
 use gyre_stage::{Launch, StageCounters, StageError, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
 
-pub use ask::{AskError, ask};
+pub use ask::ask;
 pub use fixes::FixSettings;
 pub use gyre_stages::live_radar::Sizes;
 

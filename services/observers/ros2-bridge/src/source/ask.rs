@@ -5,9 +5,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Configuration, SweepAssembler};
-use gyre_stages::live_radar::Sizes;
-use thiserror::Error;
+use gyre_colossus::Configuration;
+use gyre_stages::live_radar::{AskError, Sizes};
 
 use super::{Settings, configuration_estimate::ConfigurationEstimate, driver::Driver};
 use crate::NodeError;
@@ -17,38 +16,16 @@ use crate::NodeError;
 const MAX_WAIT: Duration = Duration::from_secs(6);
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-#[derive(Debug, Error)]
-#[error("{reason}")]
-pub struct AskError {
-    reason: String,
-    /// True of a driver that may still come, or whose radar may.
-    pub may_pass: bool,
-}
-
-impl AskError {
-    fn of(reason: String, may_pass: bool) -> Self {
-        Self { reason, may_pass }
-    }
-}
-
 impl From<NodeError> for AskError {
     fn from(error: NodeError) -> Self {
-        Self::of(error.to_string(), false)
+        Self::lasting(error.to_string())
     }
 }
 
 /// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
-    let configuration = configuration(settings)?;
-    let assembler = SweepAssembler::new(&configuration, settings.constants);
-    let assembler = assembler.map_err(|error| {
-        let reason = format!("the radar on {} cannot be used: {error}", settings.topic);
-        AskError::of(reason, false)
-    })?;
-    Ok(Sizes {
-        period_ns: configuration.period_ns(),
-        limits: assembler.limits(),
-    })
+    let place = format!("on {}", settings.topic);
+    Sizes::of(&configuration(settings)?, settings.constants, &place)
 }
 
 /// Returns the configuration that the driver publishes, or the one that its azimuths show.
@@ -68,23 +45,20 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     let topic = &settings.topic;
     if driver.found()?.is_none() {
         let domain = settings.domain.id();
-        let reason = format!(
+        return Err(AskError::passing(format!(
             "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
-        );
-        return Err(AskError::of(reason, true));
+        )));
     }
     let Some(resolution_m) = settings.constants.range_resolution_m else {
         let topic = settings.configuration_topic();
-        let reason = format!(
+        return Err(AskError::lasting(format!(
             "the driver publishes no {topic}, and nothing else gives the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
-        );
-        return Err(AskError::of(reason, false));
+        )));
     };
     let found = estimate.configuration(settings.encoder_counts, resolution_m);
     found.ok_or_else(|| {
-        let reason = format!(
+        AskError::passing(format!(
             "the driver publishes {topic}, but no azimuth arrives: check that the radar is on and in reach of its driver"
-        );
-        AskError::of(reason, true)
+        ))
     })
 }
