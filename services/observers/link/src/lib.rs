@@ -47,7 +47,7 @@ pub use {
     base::run as run_base,
     error::LinkError,
     handshake::ask_robot,
-    receive::{ReceiveOptions, Received, ask, receive},
+    receive::{Received, ask, receive},
     robot::run as run_robot,
-    send::{SendOptions, Sent, send},
+    send::{Sent, send},
 };

@@ -34,15 +34,6 @@ const PAUSE: Duration = Duration::from_millis(200);
 
 const ASK_FOR_RUN: Question = Question("ask for a run", "the sender");
 
-#[derive(Clone, Debug)]
-pub struct ReceiveOptions {
-    pub out: PathBuf,
-    pub link: LinkConfig,
-    pub gyre: String,
-    /// Topics to receive of those that are sent; empty: all.
-    pub topics: Vec<String>,
-}
-
 pub struct RemoteRun {
     session: Session,
     offer: RunOffer,
@@ -90,22 +81,26 @@ impl RemoteRun {
     }
 }
 
+/// Receives these topics of those that are sent; without any all. `gyre` is the program.
 pub fn receive(
-    options: &ReceiveOptions,
+    out: &Path,
+    link: &LinkConfig,
+    topics: &[String],
+    gyre: String,
     remote: RemoteRun,
     signals: &Signals,
 ) -> Result<Received, LinkError> {
-    let manifest = remote.manifest(&options.out);
+    let manifest = remote.manifest(out);
     let journal = Journal::open(&journal::path(&manifest.out))?;
-    let next_pose = next_pose(&journal, &remote.offer, &options.out)?;
-    let guardian = [options.gyre.clone(), "guard".to_owned()];
+    let next_pose = next_pose(&journal, &remote.offer, out)?;
+    let guardian = [gyre, "guard".to_owned()];
     let rig = Rig::new(manifest, &remote.offer.configuration, &guardian, signals)?;
     let _log = launch::start_log(rig.manifest(), NAME)?;
     let RemoteRun { session, offer } = remote;
     let mut mirror = Mirror {
         session: session.clone(),
-        link: options.link.name.clone(),
-        receiver: receiver(&options.out, &session)?,
+        link: link.name.clone(),
+        receiver: receiver(out, &session)?,
         topics: Vec::new(),
         journal,
         next_pose,
@@ -115,7 +110,7 @@ pub fn receive(
         rig,
     };
     for offered in mirror.offer.topics.clone() {
-        if options.topics.is_empty() || options.topics.contains(&offered.name) {
+        if topics.is_empty() || topics.contains(&offered.name) {
             mirror.topics.push(mirror.open(&offered)?);
         }
     }

@@ -9,7 +9,7 @@
 use std::{
     collections::BTreeMap,
     fmt, fs,
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -45,16 +45,6 @@ const MAX_BYTES: usize = 64 << 20;
 const RECONNECT_TIME: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would arrive later.
 const MAX_SCANS: usize = 2;
-
-#[derive(Clone, Debug)]
-pub struct SendOptions {
-    pub out: PathBuf,
-    pub link: LinkConfig,
-    /// The topics; empty: all that the run has but scans and rasters.
-    pub topics: Vec<String>,
-    /// Time to wait, after the end of the run, for receivers that have not everything yet.
-    pub linger: Duration,
-}
 
 /// The messages and bytes that were sent to all receivers together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -112,17 +102,24 @@ pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
     Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
 }
 
-pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
-    check(&options.link)?;
-    let run = ObservedRun::writing_to(&options.out)?;
+/// Sends these topics (without any: all that the run has but scans and rasters), and waits for
+/// `linger` after the end of the run for receivers that have not everything yet.
+pub fn send(
+    out: &Path,
+    link: &LinkConfig,
+    topics: &[String],
+    linger: Duration,
+) -> Result<Sent, LinkError> {
+    check(link)?;
+    let run = ObservedRun::writing_to(out)?;
     let _log = launch::start_log(run.manifest(), NAME)?;
     let signals = Signals::install()?;
     let pause = || Ok(signals.sleep(MAX_WAIT)?);
-    let Some(session) = session::open(&options.link, pause)? else {
+    let Some(session) = session::open(link, pause)? else {
         return Ok(Sent::default());
     };
-    let sending = Sending::begin(&run, options, &session)?;
-    let sent = sending.run(&signals, options.linger);
+    let sending = Sending::begin(&run, &link.name, topics, &session)?;
+    let sent = sending.run(&signals, linger);
     let _ = session.close().wait();
     sent
 }
@@ -144,14 +141,15 @@ struct SentTopic<'run> {
 impl<'run> Sending<'run> {
     fn begin(
         run: &'run ObservedRun,
-        options: &SendOptions,
+        link: &str,
+        named: &[String],
         session: &Session,
     ) -> Result<Self, LinkError> {
         let manifest = run.manifest();
-        let prefix = prefix(&options.link.name, &session.zid().to_string());
+        let prefix = prefix(link, &session.zid().to_string());
         let mut server = Server::new(session, &prefix, None);
         let poses = Arc::new(LogBuffer::of_poses(&manifest.out));
-        let names = topics(&options.topics, manifest)?;
+        let names = topics(named, manifest)?;
         let topics = names.iter().copied().map(|name| {
             let observer = run.observe_topic(name)?.ok_or_else(|| no_topic(name))?;
             let buffer = buffer(name, manifest, &poses)?;
@@ -166,7 +164,7 @@ impl<'run> Sending<'run> {
         Ok(Self {
             run,
             topics,
-            _offer: offer(session, options, manifest, &names)?,
+            _offer: offer(session, link, manifest, &names)?,
             _server: server,
         })
     }
@@ -288,7 +286,7 @@ fn no_topic(name: &str) -> LinkError {
 
 fn offer(
     session: &Session,
-    options: &SendOptions,
+    link: &str,
     manifest: &Manifest,
     names: &[&'static str],
 ) -> Result<Queryable<()>, LinkError> {
@@ -309,7 +307,7 @@ fn offer(
         began_ns: None,
         topics: names.iter().map(offered).collect(),
     };
-    let key = offer_key(&options.link.name);
+    let key = offer_key(link);
     let out = manifest.out.clone();
     request::answer(session, key, "offer a run", move || RunOffer {
         began_ns: began_ns(&out).ok().flatten(),
