@@ -24,8 +24,8 @@ use zenoh::{
 };
 
 use crate::{
-    LinkError,
     connection_log::ConnectionLog,
+    error::{failed, other_version},
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
     replay_buffer::{LogBuffer, MemoryBuffer, ReplayBuffer},
@@ -45,7 +45,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let topics = config.cut.topics(manifest.refines, manifest.window.slam);
     let mut stages = FirstStages::open(launch, &topics, config.returns_motions())?;
     let waker = Waker::new()?;
-    let sleep = || Ok(stages.sleep(waker.descriptor())?);
+    let sleep = || stages.sleep(waker.descriptor());
     let Some(session) = session::open(&config, sleep)? else {
         return Ok(stages.counters());
     };
@@ -97,7 +97,7 @@ struct FromRobot {
 }
 
 impl Base<'_> {
-    fn work(&mut self) -> Result<(), LinkError> {
+    fn work(&mut self) -> Result<(), StageError> {
         let Some(start) = self.start()? else {
             return Ok(());
         };
@@ -163,7 +163,7 @@ impl Base<'_> {
 
     /// Waits until pose-integration has published the newest pose; returns the first item that the
     /// stages need. `None` on a request to stop.
-    fn start(&mut self) -> Result<Option<u64>, LinkError> {
+    fn start(&mut self) -> Result<Option<u64>, StageError> {
         loop {
             // Sleep first, as the source of scans does.
             if self.stages.sleep(self.waker.descriptor())? {
@@ -187,7 +187,7 @@ impl Base<'_> {
         }
     }
 
-    fn offer(&self) -> Result<ToRobot, LinkError> {
+    fn offer(&self) -> Result<ToRobot, StageError> {
         let manifest = &self.launch.manifest;
         let prefix = handshake::prefix(&self.config, Side::Base);
         let mut server = Server::new(&self.session, &prefix, Some(self.waker.clone()));
@@ -203,7 +203,7 @@ impl Base<'_> {
                 waker.wake();
             })
             .wait()
-            .map_err(|e| LinkError::zenoh("wait for the robot", &e))?;
+            .map_err(|e| failed("wait for the robot", &e))?;
         let pose_offer = server.offer(Pose::TOPIC, poses.clone())?;
         server.offer(Motion::TOPIC, motions.clone())?;
         Ok(ToRobot {
@@ -245,7 +245,7 @@ impl Base<'_> {
         (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq)
     }
 
-    fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), LinkError> {
+    fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), StageError> {
         let newest = self.stages.newest_pose().max(self.resumed_at());
         let published = newest.map_or(0, |newest| newest.saturating_add(1));
         to_robot.poses.set_published(published);
@@ -256,14 +256,14 @@ impl Base<'_> {
     }
 
     /// Answers a robot that starts; true if it is admitted.
-    fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, LinkError> {
+    fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, StageError> {
         let ours = Agreement::of(&self.launch.manifest, &self.config, &self.topics);
         let bytes = query.payload().map(|payload| payload.to_bytes());
         let theirs = serde_json::from_slice::<Agreement>(&bytes.unwrap_or_default());
         let drive = theirs.as_ref().ok().and_then(|theirs| theirs.drive.clone());
         let is_other = self.drive.is_some() && drive != self.drive && self.next() > 0;
         let answer = match theirs.map(|theirs| ours.difference(&theirs)) {
-            Err(_) => StartAnswer::Refused(LinkError::other_version("the base").to_string()),
+            Err(_) => StartAnswer::Refused(other_version("the base").to_string()),
             Ok(Some(difference)) => StartAnswer::Refused(difference),
             Ok(None) if is_other => StartAnswer::Refused(
                 "the base has poses of a different drive: begin both anew with --fresh".to_owned(),
@@ -276,7 +276,7 @@ impl Base<'_> {
         if let StartAnswer::Refused(why) = &answer {
             tracing::warn!("a robot was refused: {why}");
         }
-        let text = serde_json::to_vec(&answer).map_err(|e| LinkError::zenoh("answer", &e))?;
+        let text = serde_json::to_vec(&answer).map_err(|e| failed("answer", &e))?;
         let replied = query.reply(handshake::start_key(&self.config), text).wait();
         let is_admitted = replied.is_ok() && matches!(answer, StartAnswer::Go(_));
         if is_admitted {
@@ -291,7 +291,7 @@ impl Base<'_> {
         topics: &mut [FromRobot],
         to_robot: &ToRobot,
         end: &mut Option<Item>,
-    ) -> Result<bool, LinkError> {
+    ) -> Result<bool, StageError> {
         let items = topics.iter().map(|topic| topic.messages.front()?.item());
         let Some(items) = items.collect::<Option<Vec<Item>>>() else {
             return Ok(false);
@@ -321,12 +321,12 @@ impl Base<'_> {
 
     /// Checks that the next item follows the published ones, and is of the same drive. After a
     /// start some topics may lack an item that was published before.
-    fn check_next(&self, item: &Item, all: &[Item]) -> Result<(), LinkError> {
+    fn check_next(&self, item: &Item, all: &[Item]) -> Result<(), StageError> {
         let begins = self.published.is_none() && item.seq < self.next();
         let is_whole = all.iter().all(|other| other.seq == item.seq);
         let follows = is_whole && item.seq == self.next();
         if !begins && !follows {
-            return Err(LinkError::Refused(format!(
+            return Err(StageError::Input(format!(
                 "the robot sends item {}, but this run needs {}, which the robot no longer has: begin both anew with --fresh",
                 item.seq,
                 self.next()
@@ -334,7 +334,7 @@ impl Base<'_> {
         }
         let is_resumed = self.resumed_at() == Some(item.seq);
         match is_resumed && item.stamp_ns != self.resumed.stamp_ns {
-            true => Err(LinkError::Refused(format!(
+            true => Err(StageError::Input(format!(
                 "the robot's scan {} is not the one that this run has a pose of: it plays a different drive; begin both anew with --fresh",
                 item.scan
             ))),
@@ -350,7 +350,7 @@ impl FromRobot {
         is_next.then(|| self.messages.pop_front())?
     }
 
-    fn receive(&mut self) -> Result<(), LinkError> {
+    fn receive(&mut self) -> Result<(), StageError> {
         while let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? {
             self.messages.push_back(message);
         }

@@ -5,11 +5,11 @@ use std::{fs, path::Path, thread, time::Duration};
 
 use gyre_messages::{Limits, topic};
 use gyre_run::{BEGUN_WITH, LinkConfig, Side};
-use gyre_stage::Manifest;
+use gyre_stage::{Manifest, StageError};
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
-use crate::{LinkError, request::Question, session};
+use crate::{error::failed, request::Question, session};
 
 /// Time between two questions before a run exists, whose own waits take over.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -35,13 +35,13 @@ pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
 
 /// Waits for the robot and asks for the bytes of its largest scan, which a base needs that receives
 /// scans.
-pub fn ask_robot(config: &LinkConfig) -> Result<usize, LinkError> {
+pub fn ask_robot(config: &LinkConfig) -> Result<usize, StageError> {
     let pause = || {
         thread::sleep(PAUSE);
         Ok(false)
     };
     let session = session::open(config, pause)?;
-    let failed = || LinkError::zenoh(ASK_FOR_SCANS.0, &"it was interrupted");
+    let failed = || failed(ASK_FOR_SCANS.0, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {
         if let Some(bytes) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
@@ -147,8 +147,8 @@ pub(crate) fn ask_base(
     session: &Session,
     config: &LinkConfig,
     agreement: &Agreement,
-) -> Result<Option<StartAnswer>, LinkError> {
+) -> Result<Option<StartAnswer>, StageError> {
     let payload = serde_json::to_vec(agreement);
-    let payload = payload.map_err(|e| LinkError::zenoh(ASK_FOR_START.0, &e))?;
+    let payload = payload.map_err(|e| failed(ASK_FOR_START.0, &e))?;
     ASK_FOR_START.ask(session, start_key(config), payload)
 }

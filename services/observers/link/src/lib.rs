@@ -45,7 +45,6 @@ pub use network::{NetworkError, ONE_THREAD, check};
 #[cfg(feature = "zenoh")]
 pub use {
     base::run as run_base,
-    error::LinkError,
     handshake::ask_robot,
     receive::{Received, ask, receive},
     robot::run as run_robot,

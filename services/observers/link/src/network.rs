@@ -3,6 +3,7 @@
 use std::net::IpAddr;
 
 use gyre_run::LinkConfig;
+use gyre_stage::StageError;
 use thiserror::Error;
 
 /// The environment variable, and its value, that make zenoh do all its work in one thread.
@@ -18,6 +19,12 @@ pub const ONE_THREAD: (&str, &str) = (
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{0}")]
 pub struct NetworkError(String);
+
+impl From<NetworkError> for StageError {
+    fn from(error: NetworkError) -> Self {
+        Self::Input(format!("link: {error}"))
+    }
+}
 
 /// The suffixes of names that no public authority certifies: private zones, and names reserved for
 /// documents.

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
+use gyre_stage::StageError;
 use serde::{Serialize, de::DeserializeOwned};
 use zenoh::{
     Session, Wait, bytes::ZBytes, handlers::FifoChannelHandler, query::Queryable, query::Reply,
 };
 
-use crate::LinkError;
+use crate::error::{failed, other_version};
 
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
@@ -24,9 +25,9 @@ impl Question {
         session: &Session,
         key: String,
         payload: impl Into<ZBytes>,
-    ) -> Result<Answers, LinkError> {
+    ) -> Result<Answers, StageError> {
         let asked = session.get(key).payload(payload).timeout(ANSWER_TIMEOUT);
-        asked.wait().map_err(|e| LinkError::zenoh(self.0, &e))
+        asked.wait().map_err(|e| failed(self.0, &e))
     }
 
     /// Sends the question and waits for the answer; returns `None` without an answer.
@@ -35,7 +36,7 @@ impl Question {
         session: &Session,
         key: String,
         payload: impl Into<ZBytes>,
-    ) -> Result<Option<A>, LinkError> {
+    ) -> Result<Option<A>, StageError> {
         match self.send(session, key, payload)?.recv() {
             Ok(reply) => self.parse(reply),
             Err(_) => Ok(None),
@@ -43,14 +44,12 @@ impl Question {
     }
 
     /// Parses an answer; `None` if it is an error of the network layer.
-    pub fn parse<A: DeserializeOwned>(self, reply: Reply) -> Result<Option<A>, LinkError> {
+    pub fn parse<A: DeserializeOwned>(self, reply: Reply) -> Result<Option<A>, StageError> {
         let Ok(sample) = reply.into_result() else {
             return Ok(None);
         };
         let answer = serde_json::from_slice(&sample.payload().to_bytes());
-        answer
-            .map(Some)
-            .map_err(|_| LinkError::other_version(self.1))
+        answer.map(Some).map_err(|_| other_version(self.1))
     }
 }
 
@@ -60,7 +59,7 @@ pub(crate) fn answer<A: Serialize>(
     key: String,
     action: &str,
     answer: impl Fn() -> A + Send + Sync + 'static,
-) -> Result<Queryable<()>, LinkError> {
+) -> Result<Queryable<()>, StageError> {
     let reply_key = key.clone();
     session
         .declare_queryable(key)
@@ -70,5 +69,5 @@ pub(crate) fn answer<A: Serialize>(
             }
         })
         .wait()
-        .map_err(|e| LinkError::zenoh(action, &e))
+        .map_err(|e| failed(action, &e))
 }

@@ -28,7 +28,6 @@ use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait, query::Queryable};
 
 use crate::{
-    LinkError,
     network::check,
     replay_buffer::{LogBuffer, MemoryBuffer, MotionBuffer, ReplayBuffer},
     request,
@@ -97,9 +96,12 @@ pub(crate) fn offer_key(name: &str) -> String {
 }
 
 /// Returns the time of the first pose in a folder, ns since 1970.
-pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
-    let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
-    Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
+pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, StageError> {
+    let records = journal::records(&journal::path(out)).map_err(StageError::input)?;
+    let first = records.into_iter().flatten().next().transpose();
+    Ok(first
+        .map_err(StageError::input)?
+        .map(|pose| pose.item.stamp_ns))
 }
 
 /// Sends these topics (without any: all that the run has but scans and rasters), and waits for
@@ -109,12 +111,12 @@ pub fn send(
     link: &LinkConfig,
     topics: &[String],
     linger: Duration,
-) -> Result<Sent, LinkError> {
+) -> Result<Sent, StageError> {
     check(link)?;
     let run = ObservedRun::writing_to(out)?;
     let _log = launch::start_log(run.manifest(), NAME)?;
     let signals = Signals::install()?;
-    let pause = || Ok(signals.sleep(MAX_WAIT)?);
+    let pause = || signals.sleep(MAX_WAIT);
     let Some(session) = session::open(link, pause)? else {
         return Ok(Sent::default());
     };
@@ -144,7 +146,7 @@ impl<'run> Sending<'run> {
         link: &str,
         named: &[String],
         session: &Session,
-    ) -> Result<Self, LinkError> {
+    ) -> Result<Self, StageError> {
         let manifest = run.manifest();
         let prefix = prefix(link, &session.zid().to_string());
         let mut server = Server::new(session, &prefix, None);
@@ -160,7 +162,7 @@ impl<'run> Sending<'run> {
                 buffer,
             })
         });
-        let topics = topics.collect::<Result<Vec<_>, LinkError>>()?;
+        let topics = topics.collect::<Result<Vec<_>, StageError>>()?;
         Ok(Self {
             run,
             topics,
@@ -169,7 +171,7 @@ impl<'run> Sending<'run> {
         })
     }
 
-    fn run(mut self, signals: &Signals, linger: Duration) -> Result<Sent, LinkError> {
+    fn run(mut self, signals: &Signals, linger: Duration) -> Result<Sent, StageError> {
         let mut ended: Option<Instant> = None;
         loop {
             // Before the queues are read: messages from before the end are still in them.
@@ -236,7 +238,7 @@ fn buffer(
     name: &str,
     manifest: &Manifest,
     poses: &Arc<LogBuffer>,
-) -> Result<Arc<dyn ReplayBuffer>, LinkError> {
+) -> Result<Arc<dyn ReplayBuffer>, StageError> {
     let composed = match manifest.refines {
         true => Refined::TOPIC,
         false => Motion::TOPIC,
@@ -244,7 +246,7 @@ fn buffer(
     let buffer: Arc<dyn ReplayBuffer> = match name {
         Pose::TOPIC => poses.clone(),
         Loop::TOPIC => {
-            let loops = LoggedLoops::open(&manifest.out).map_err(StageError::from)?;
+            let loops = LoggedLoops::open(&manifest.out)?;
             Arc::new(LogBuffer::of_loops(loops))
         }
         _ if name == composed => Arc::new(MotionBuffer(poses.clone())),
@@ -260,7 +262,7 @@ fn is_lossless(topic: &str) -> bool {
 }
 
 /// Returns the topics to send; poses are among them, since the motions come with them.
-fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, LinkError> {
+fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, StageError> {
     let named: Vec<&str> = match named.is_empty() {
         true => DEFAULT
             .into_iter()
@@ -278,8 +280,8 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, Li
     Ok(topics)
 }
 
-fn no_topic(name: &str) -> LinkError {
-    LinkError::Refused(format!(
+fn no_topic(name: &str) -> StageError {
+    StageError::Input(format!(
         "there is no topic `{name}`: there are scan, masked, rotation, motion, refined, pose, loop, correction and fix"
     ))
 }
@@ -289,7 +291,7 @@ fn offer(
     link: &str,
     manifest: &Manifest,
     names: &[&'static str],
-) -> Result<Queryable<()>, LinkError> {
+) -> Result<Queryable<()>, StageError> {
     let path = manifest.root.join("config.toml");
     let offered = |name: &&'static str| OfferedTopic {
         name: (*name).to_owned(),
@@ -302,7 +304,8 @@ fn offer(
         live: manifest.live,
         refines: manifest.refines,
         rate: manifest.rate,
-        configuration: fs::read_to_string(&path).map_err(|e| LinkError::file(&path, &e))?,
+        configuration: fs::read_to_string(&path)
+            .map_err(|source| StageError::File { path, source })?,
         sender: session.zid().to_string(),
         began_ns: None,
         topics: names.iter().map(offered).collect(),

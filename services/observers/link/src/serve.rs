@@ -10,13 +10,14 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_stage::StageError;
 use zenoh::{
     Session, Wait,
     query::{Query, Queryable},
 };
 
 use crate::{
-    LinkError,
+    error::failed,
     replay_buffer::{Next, Place, ReplayBuffer},
     waker::Waker,
 };
@@ -82,7 +83,7 @@ impl Server {
         &mut self,
         topic: &str,
         buffer: Arc<dyn ReplayBuffer>,
-    ) -> Result<Arc<Offer>, LinkError> {
+    ) -> Result<Arc<Offer>, StageError> {
         let offer = Arc::new(Offer {
             buffer,
             key: format!("{}/{topic}", self.prefix),
@@ -99,7 +100,7 @@ impl Server {
             .declare_queryable(&offer.key)
             .callback(move |query| answering.clone().accept(query))
             .wait()
-            .map_err(|e| LinkError::zenoh(&format!("offer {topic}"), &e))?;
+            .map_err(|e| failed(&format!("offer {topic}"), &e))?;
         self.queryables.push(queryable);
         Ok(offer)
     }
@@ -168,7 +169,7 @@ impl Offer {
         mut place: Place,
         receiver: &str,
         request: u64,
-    ) -> Result<(), LinkError> {
+    ) -> Result<(), StageError> {
         // The receiver learns at once that this end is there.
         self.reply(query, &[])?;
         self.answered.fetch_max(place.seq, Ordering::Relaxed);
@@ -194,16 +195,16 @@ impl Offer {
                 Next::Nothing => {}
                 Next::Ended => {
                     let replied = query.reply_err(ENDED).wait();
-                    return replied.map_err(|e| LinkError::zenoh("send", &e));
+                    return replied.map_err(|e| failed("send", &e));
                 }
             }
         }
         Ok(())
     }
 
-    fn reply(&self, query: &Query, bytes: &[u8]) -> Result<(), LinkError> {
+    fn reply(&self, query: &Query, bytes: &[u8]) -> Result<(), StageError> {
         let reply = query.reply(&self.key, bytes).express(true);
-        reply.wait().map_err(|e| LinkError::zenoh("send", &e))
+        reply.wait().map_err(|e| failed("send", &e))
     }
 
     /// Notes a request of a receiver, which replaces those before; returns its number.

@@ -5,12 +5,13 @@ use std::{
     sync::Arc,
 };
 
+use gyre_stage::StageError;
 use rustix::{
     event::{EventfdFlags, eventfd},
     io::{read, write},
 };
 
-use crate::LinkError;
+use crate::error::failed;
 
 /// A descriptor that is readable from a call of [`wake`](Self::wake) to the next of
 /// [`clear`](Self::clear). Clones share it.
@@ -18,9 +19,9 @@ use crate::LinkError;
 pub(crate) struct Waker(Arc<OwnedFd>);
 
 impl Waker {
-    pub fn new() -> Result<Self, LinkError> {
+    pub fn new() -> Result<Self, StageError> {
         let event = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK);
-        let event = event.map_err(|e| LinkError::zenoh("make an event", &e))?;
+        let event = event.map_err(|e| failed("make an event", &e))?;
         Ok(Self(Arc::new(event)))
     }
 

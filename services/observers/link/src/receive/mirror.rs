@@ -2,14 +2,14 @@
 
 use gyre_journal::Journal;
 use gyre_messages::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
-use gyre_stage::{observer::Sequence, source::RecordedMessage, wake::MAX_WAIT};
+use gyre_stage::{StageError, observer::Sequence, source::RecordedMessage, wake::MAX_WAIT};
 use gyre_supervise::rig::{Feed, Recorded, Rig};
 use zenoh::{Session, qos::Priority};
 
 use super::{ASK_FOR_RUN, Received, ReceivedCount, require_same};
 use crate::{
-    LinkError,
     connection_log::ConnectionLog,
+    error::other_version,
     fetch::{Fetcher, Request},
     request::Answers,
     send::{OfferedTopic, RunOffer, began_ns, offer_key, prefix},
@@ -41,9 +41,8 @@ pub(super) struct MirroredTopic {
 }
 
 impl Mirror<'_> {
-    pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, LinkError> {
-        let other_version = || LinkError::other_version(ASK_FOR_RUN.1);
-        let topic = topic(&offered.name).ok_or_else(other_version)?;
+    pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, StageError> {
+        let topic = topic(&offered.name).ok_or_else(|| other_version(ASK_FOR_RUN.1))?;
         let from = match topic.name {
             Pose::TOPIC => self.next_pose,
             _ => 0,
@@ -79,7 +78,7 @@ impl Mirror<'_> {
     }
 
     /// Asks for another sender, and continues with it if it sends the same drive.
-    fn find_another_sender(&mut self) -> Result<(), LinkError> {
+    fn find_another_sender(&mut self) -> Result<(), StageError> {
         let Some(answers) = &self.answers else {
             let key = offer_key(&self.link);
             self.answers = Some(ASK_FOR_RUN.send(&self.session, key, [])?);
@@ -98,19 +97,19 @@ impl Mirror<'_> {
         }
     }
 
-    fn continue_with(&mut self, other: RunOffer) -> Result<(), LinkError> {
+    fn continue_with(&mut self, other: RunOffer) -> Result<(), StageError> {
         if other.sender == self.offer.sender {
             return Ok(());
         }
         other.topics.iter().try_for_each(require_same)?;
         if !self.is_same_drive(&other)? {
-            return Err(LinkError::Refused(
+            return Err(StageError::Input(
                 "the sender plays a different drive now: what arrived of this drive is whole up to here; receive the new drive into a different folder".to_owned(),
             ));
         }
         let is_sent = |topic: &MirroredTopic| other.topics.iter().any(|it| it.name == topic.name);
         if let Some(topic) = self.topics.iter().find(|topic| !is_sent(topic)) {
-            return Err(LinkError::Refused(format!(
+            return Err(StageError::Input(format!(
                 "the sender has begun again and does not send `{}` any more: give it the same --topics",
                 topic.name
             )));
@@ -131,7 +130,7 @@ impl Mirror<'_> {
         Ok(())
     }
 
-    fn is_same_drive(&self, other: &RunOffer) -> Result<bool, LinkError> {
+    fn is_same_drive(&self, other: &RunOffer) -> Result<bool, StageError> {
         let properties = |of: &RunOffer| (of.window, of.limits, of.live, of.refines);
         let began_ns = match self.next_pose {
             0 => self.offer.began_ns,
@@ -146,7 +145,7 @@ impl Mirror<'_> {
     }
 
     /// Publishes the messages that arrive until all topics have ended, or a signal arrives.
-    pub fn run(&mut self) -> Result<Received, LinkError> {
+    pub fn run(&mut self) -> Result<Received, StageError> {
         let mut connection = ConnectionLog::of("sender");
         let limits = self.rig.manifest().limits;
         loop {
@@ -195,7 +194,7 @@ impl Mirror<'_> {
 
 impl MirroredTopic {
     /// Returns the next message that has arrived, and counts those missed before it.
-    fn next_message(&mut self) -> Result<Option<RecordedMessage>, LinkError> {
+    fn next_message(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? else {
             return Ok(None);
         };
@@ -216,7 +215,7 @@ fn append(
     message: &RecordedMessage,
     next: u64,
     limits: &Limits,
-) -> Result<u64, LinkError> {
+) -> Result<u64, StageError> {
     let pose: Option<PoseHeader> = bytemuck::try_pod_read_unaligned(&message.header).ok();
     let is_new = |pose: &PoseHeader| {
         pose.item.seq == next && !pose.item.is(flag::END) && Pose::check(pose, &[], limits).is_ok()
@@ -224,6 +223,6 @@ fn append(
     let Some(pose) = pose.filter(is_new) else {
         return Ok(next);
     };
-    journal.append(&pose)?;
+    journal.append(&pose).map_err(StageError::input)?;
     Ok(next + 1)
 }
