@@ -40,7 +40,7 @@ mod tests;
 #[cfg(feature = "zenoh")]
 mod waker;
 
-pub use network::{NetworkError, ONE_THREAD, check};
+pub use network::{ONE_THREAD, check};
 
 #[cfg(feature = "zenoh")]
 pub use {

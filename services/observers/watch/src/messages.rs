@@ -53,7 +53,6 @@ pub struct RunInfo {
     pub rate: Option<f64>,
     pub window: usize,
     pub objects: bool,
-    pub version: &'static str,
 }
 
 #[derive(Debug, Serialize)]
@@ -118,7 +117,6 @@ pub fn pose(pose: &PoseHeader) -> Value {
     json!({
         "seq": pose.item.seq,
         "scan": pose.item.scan,
-        "stamp_ns": pose.item.stamp_ns,
         "vertex": Vertex::of(pose),
         "speed_mps": per_s(motion.x_m.hypot(motion.y_m)),
         "yaw_rate_radps": per_s(motion.yaw_rad),

@@ -129,7 +129,6 @@ impl RunView {
     fn update_run(&self, change: impl FnOnce(&mut RunInfo)) {
         let mut state = self.state();
         change(&mut state.run);
-        state.run.version = env!("CARGO_PKG_VERSION");
         send_json(&self.updates.run, &state.run);
     }
 
