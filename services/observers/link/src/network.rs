@@ -131,6 +131,10 @@ mod tests {
         }
     }
 
+    fn refusal(network: &LinkConfig) -> String {
+        check(network).unwrap_err().to_string()
+    }
+
     #[test]
     fn endpoints_are_tls_or_on_this_machine_and_smuggle_no_settings_of_zenoh_in() {
         let (plain, malformed) = ("would leave this machine unencrypted", "is no endpoint");
@@ -142,7 +146,7 @@ mod tests {
         let smuggling = "tls/base:7447#enable_mtls=false tcp/127.0.0.1:7447?rel=0";
         for (endpoints, words) in [(off, plain), (others, malformed), (smuggling, malformed)] {
             for endpoint in endpoints.split(' ') {
-                let refused = check(&listening(endpoint)).unwrap_err().to_string();
+                let refused = refusal(&listening(endpoint));
                 assert!(refused.contains(words), "{endpoint}: {refused}");
             }
         }
@@ -157,14 +161,13 @@ mod tests {
             path
         };
         let mut network = listening("tls/0.0.0.0:7447");
-        let lacks = |network: &LinkConfig| check(network).unwrap_err().to_string();
-        assert!(lacks(&network).contains("(ca)"));
+        assert!(refusal(&network).contains("(ca)"));
         network.ca = file("ca.pem");
-        assert!(lacks(&network).contains("(certificate)"));
+        assert!(refusal(&network).contains("(certificate)"));
         network.certificate = file("robot.pem");
-        assert!(lacks(&network).contains("(key)"));
+        assert!(refusal(&network).contains("(key)"));
         network.key = folder.path().join("missing.key");
-        assert!(lacks(&network).contains("cannot be read"));
+        assert!(refusal(&network).contains("cannot be read"));
         network.key = file("robot.key");
         assert!(check(&network).is_ok());
     }
@@ -188,12 +191,7 @@ mod tests {
             key: path(),
             ..LinkConfig::default()
         };
-        assert!(
-            check(&network)
-                .unwrap_err()
-                .to_string()
-                .contains("public name")
-        );
+        assert!(refusal(&network).contains("public name"));
     }
 
     #[test]
@@ -201,20 +199,10 @@ mod tests {
         for name in ["", "a/b", "*", "rob ot"] {
             let mut network = listening("tcp/127.0.0.1:7447");
             network.name = name.to_owned();
-            assert!(
-                check(&network)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("is no name")
-            );
+            assert!(refusal(&network).contains("is no name"));
         }
         let mut nowhere = listening("");
         nowhere.listen.clear();
-        assert!(
-            check(&nowhere)
-                .unwrap_err()
-                .to_string()
-                .contains("no endpoint")
-        );
+        assert!(refusal(&nowhere).contains("no endpoint"));
     }
 }
