@@ -84,6 +84,5 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Sta
         listen: gnss.listen,
     });
     let scans = settings.scans;
-    let radar = radar::Radar::open(settings).map_err(|error| StageError::Input(error.to_string()));
-    source::run_sensor(launch, &mut radar?, scans)
+    source::run_sensor(launch, &mut radar::Radar::open(settings)?, scans)
 }

@@ -6,21 +6,15 @@ use std::{
 };
 
 use gyre_colossus::Configuration;
+use gyre_stage::StageError;
 use gyre_stages::live_radar::{AskError, Sizes};
 
 use super::{Settings, configuration_estimate::ConfigurationEstimate, driver::Driver};
-use crate::NodeError;
 
 /// The longest wait for the configuration, which the driver repeats every four turns. Meanwhile
 /// azimuths come, to estimate it from.
 const MAX_WAIT: Duration = Duration::from_secs(6);
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
-
-impl From<NodeError> for AskError {
-    fn from(error: NodeError) -> Self {
-        Self::lasting(error.to_string())
-    }
-}
 
 /// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
@@ -30,10 +24,11 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
 
 /// Returns the configuration that the driver publishes, or the one that its azimuths show.
 fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
-    let mut driver = Driver::open(settings)?;
+    let lasting = |error: StageError| AskError::lasting(error.to_string());
+    let mut driver = Driver::open(settings).map_err(lasting)?;
     let (mut estimate, started) = (ConfigurationEstimate::default(), Instant::now());
     while started.elapsed() < MAX_WAIT {
-        driver.receive()?;
+        driver.receive().map_err(lasting)?;
         if let Ok(Some(described)) = driver.configuration() {
             return Ok(described.radar);
         }
@@ -43,7 +38,7 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
         sleep(POLL_INTERVAL);
     }
     let topic = &settings.topic;
-    if driver.found()?.is_none() {
+    if driver.found().map_err(lasting)?.is_none() {
         let domain = settings.domain.id();
         return Err(AskError::passing(format!(
             "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"

@@ -1,6 +1,6 @@
 //! The topics of Navtech's driver.
 
-use std::{io, os::fd::BorrowedFd};
+use std::os::fd::BorrowedFd;
 
 use gyre_colossus::{Azimuth, Configuration};
 use gyre_ros2_messages::{
@@ -12,11 +12,11 @@ use gyre_ros2_messages::{
     std_msgs::Header,
 };
 use gyre_samples::Sample;
-use gyre_stage::clock;
+use gyre_stage::{StageError, clock};
 use ros2_client::{Gid, ReadError, Subscription};
 
 use super::{Settings, fixes::Fixes, wakeups::Wakeups};
-use crate::{NodeError, node::Node};
+use crate::node::Node;
 
 const NODE: &str = "gyre_source";
 /// Azimuths that are kept until they are taken: ten turns. The driver keeps one turn.
@@ -100,7 +100,7 @@ pub struct DescribedRadar {
 }
 
 impl Driver {
-    pub fn open(settings: &Settings) -> Result<Self, NodeError> {
+    pub fn open(settings: &Settings) -> Result<Self, StageError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
@@ -128,11 +128,11 @@ impl Driver {
     }
 
     /// Returns the type of the azimuths' topic on DDS; `None` while there is no publisher.
-    pub fn found(&self) -> Result<Option<String>, NodeError> {
+    pub fn found(&self) -> Result<Option<String>, StageError> {
         match self.node.type_of(&self.dds_name) {
             Some(found) if !names().contains(&found) => {
                 let (topic, names) = (&self.topic, names().join(", "));
-                Err(NodeError(format!(
+                Err(StageError::Input(format!(
                     "{topic} carries {found}, but Gyre reads {names}"
                 )))
             }
@@ -141,7 +141,7 @@ impl Driver {
     }
 
     /// Subscribes to the azimuths once there is a publisher; returns whether there is one.
-    pub fn receive(&mut self) -> Result<bool, NodeError> {
+    pub fn receive(&mut self) -> Result<bool, StageError> {
         if self.azimuths.is_some() {
             return Ok(true);
         }
@@ -167,7 +167,7 @@ impl Driver {
         self.wakeups.descriptor()
     }
 
-    pub fn clear(&mut self) -> io::Result<()> {
+    pub fn clear(&mut self) -> Result<(), StageError> {
         self.wakeups.clear()
     }
 
@@ -231,7 +231,7 @@ fn subscribe<M: Ros2Message + Send + 'static>(
     topic: &str,
     depth: usize,
     is_lossy: bool,
-) -> Result<Subscription<M>, NodeError> {
+) -> Result<Subscription<M>, StageError> {
     let mut subscription = node.subscribe(topic, depth, is_lossy)?;
     wakeups.add(&mut subscription)?;
     Ok(subscription)

@@ -21,7 +21,6 @@ use super::{
     configuration_estimate::ConfigurationEstimate,
     driver::{DescribedRadar, Driver, Packet, PacketMessage},
 };
-use crate::NodeError;
 
 const MAX_MESSAGES: usize = 512;
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
@@ -50,7 +49,7 @@ pub struct Radar {
 }
 
 impl Radar {
-    pub fn open(settings: Settings) -> Result<Self, NodeError> {
+    pub fn open(settings: Settings) -> Result<Self, StageError> {
         let now = Instant::now();
         Ok(Self {
             intake: Intake::new(settings.constants),
@@ -228,9 +227,8 @@ impl Sensor for Radar {
     }
 
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
-        let input = |error: NodeError| StageError::Input(error.to_string());
-        let is_received = self.driver.receive().map_err(input)?;
-        self.driver.clear().map_err(|error| input(error.into()))?;
+        let is_received = self.driver.receive()?;
+        self.driver.clear()?;
         self.driver.pass_fixes_on();
         self.take_configuration(bytes.len())?;
         if let Some((turn, rows)) = self.turn.take()
