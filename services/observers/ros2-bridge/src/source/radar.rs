@@ -39,11 +39,9 @@ pub struct Radar {
     opened: Instant,
     /// A turn, and how many of its rows were added: a scan can be complete before its end.
     turn: Option<(RadarBScanMsg, usize)>,
-    /// Who publishes the azimuths, and how often that has changed.
+    /// Who publishes the azimuths, and the number of publishers so far.
     publisher: Option<Gid>,
-    changes: u64,
-    /// The counts of the source process before this one, if it died.
-    before: Received,
+    publishers: u64,
     last_azimuth: Instant,
     is_silent: bool,
 }
@@ -60,8 +58,7 @@ impl Radar {
             opened: now,
             turn: None,
             publisher: None,
-            changes: 0,
-            before: Received::default(),
+            publishers: 0,
             last_azimuth: now,
             is_silent: false,
         })
@@ -155,9 +152,9 @@ impl Radar {
                 self.intake.damaged(reason, 0);
                 return Ok(false);
             }
-            before => {
+            _ => {
                 self.publisher = Some(publisher);
-                self.changes += u64::from(before.is_some());
+                self.publishers += 1;
                 self.intake.restart();
                 if let Some(described) = self.described {
                     self.configure(described, room)?;
@@ -272,16 +269,12 @@ impl Sensor for Radar {
 
     fn resume(&mut self, before: Received) {
         self.intake.resume(before);
-        self.before = before;
     }
 
     fn received(&self) -> Received {
-        Received {
-            connections: self.before.connections
-                + u64::from(self.publisher.is_some())
-                + self.changes,
-            is_receiving: self.publisher.is_some() && !self.is_silent,
-            ..self.intake.received()
-        }
+        let mut counts = self.intake.received();
+        counts.connections += self.publishers;
+        counts.is_receiving = self.publisher.is_some() && !self.is_silent;
+        counts
     }
 }
