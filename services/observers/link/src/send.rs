@@ -134,7 +134,6 @@ struct Sending<'run> {
 }
 
 struct SentTopic<'run> {
-    name: &'static str,
     observer: TopicObserver<'run>,
     buffer: Arc<dyn ReplayBuffer>,
     offer: Arc<Offer>,
@@ -156,7 +155,6 @@ impl<'run> Sending<'run> {
             let observer = run.observe_topic(name)?.ok_or_else(|| no_topic(name))?;
             let buffer = buffer(name, manifest, &poses)?;
             Ok(SentTopic {
-                name,
                 observer,
                 offer: server.offer(name, buffer.clone())?,
                 buffer,
@@ -211,7 +209,7 @@ impl<'run> Sending<'run> {
 
     fn sent(&self) -> Sent {
         let topics = self.topics.iter();
-        let topics = topics.map(|topic| (topic.name.to_owned(), topic.offer.sent()));
+        let topics = topics.map(|topic| (topic.observer.topic().to_owned(), topic.offer.sent()));
         Sent {
             topics: topics.collect(),
             is_incomplete: !self.is_complete(),
