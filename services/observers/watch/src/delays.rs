@@ -1,81 +1,58 @@
 //! Delays of the last minute.
 
-use std::collections::VecDeque;
-
 use gyre_messages::{Item, StageId};
 use serde_json::{Value, json};
 
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
-/// The most poses: above 136 a second the window is shorter than a minute.
-const MAX_POSES: usize = 8192;
-
-#[derive(Debug, Default)]
-pub struct Delays {
-    /// The items of poses, with their times by `CLOCK_MONOTONIC`.
-    poses: VecDeque<Item>,
+/// Returns the percentiles of the poses of the last minute, ms: of sensor to pose, and of each stage
+/// the hand-over, from the publication by the stage before to the start of the work, and the work.
+pub fn report<'a>(items: impl Iterator<Item = &'a Item>, now_ns: i64) -> Value {
+    let items = items.filter(|item| finished_ns(item) >= now_ns - WINDOW_NS);
+    let items: Vec<&Item> = items.collect();
+    let mut of_stages = StageId::ALL.map(|_| (Vec::new(), Vec::new()));
+    for times in items.iter().flat_map(|item| item.hop_times()) {
+        let (hand_over, work) = &mut of_stages[times.stage as usize];
+        hand_over.push(times.transport_ns.unwrap_or(0) + times.wait_ns);
+        work.push(times.work_ns);
+    }
+    let percentiles = |delays_ns: Vec<i64>| {
+        let [p50_ms, p99_ms] = at(delays_ns, [0.5, 0.99])?;
+        Some(json!({"p50_ms": p50_ms, "p99_ms": p99_ms}))
+    };
+    let stages = StageId::ALL.into_iter().zip(of_stages);
+    let stages = stages.filter_map(|(stage, (hand_over, work))| {
+        let (hand_over, work) = (percentiles(hand_over)?, percentiles(work)?);
+        Some(json!({"stage": stage.name(), "hand_over": hand_over, "work": work}))
+    });
+    let sensor_to_pose = items.iter().map(|item| item.sensor_to_pose_ns());
+    let none = || json!({"p50_ms": 0.0, "p99_ms": 0.0});
+    json!({
+        "samples": items.len(),
+        "sensor_to_pose": percentiles(sensor_to_pose.collect()).unwrap_or_else(none),
+        "stages": stages.collect::<Vec<_>>(),
+        "series": series(&items, now_ns),
+    })
 }
 
-impl Delays {
-    pub fn add(&mut self, item: &Item) {
-        self.poses.push_back(*item);
-        if self.poses.len() > MAX_POSES {
-            self.poses.pop_front();
+/// Returns median and maximum of sensor to pose in each second, oldest first: a second has too few
+/// poses for a percentile beyond. The last second is not over, and is left out.
+fn series(items: &[&Item], now_ns: i64) -> Vec<Option<Value>> {
+    let steps = WINDOW_NS / STEP_NS;
+    let mut of_step = vec![Vec::new(); steps as usize];
+    let end = now_ns / STEP_NS;
+    for item in items {
+        let step = finished_ns(item) / STEP_NS - (end - steps);
+        if (0..steps).contains(&step) {
+            of_step[step as usize].push(item.sensor_to_pose_ns());
         }
     }
-
-    /// Removes poses older than a minute, and returns the percentiles of the rest, ms: of sensor to
-    /// pose, and of each stage the hand-over, from the publication by the stage before to the start
-    /// of the work, and the work.
-    pub fn report(&mut self, now_ns: i64) -> Value {
-        let is_old = |item: &Item| finished_ns(item) < now_ns - WINDOW_NS;
-        while self.poses.front().is_some_and(is_old) {
-            self.poses.pop_front();
-        }
-        let mut of_stages = StageId::ALL.map(|_| (Vec::new(), Vec::new()));
-        for times in self.poses.iter().flat_map(|item| item.hop_times()) {
-            let (hand_over, work) = &mut of_stages[times.stage as usize];
-            hand_over.push(times.transport_ns.unwrap_or(0) + times.wait_ns);
-            work.push(times.work_ns);
-        }
-        let percentiles = |delays_ns: Vec<i64>| {
-            let [p50_ms, p99_ms] = at(delays_ns, [0.5, 0.99])?;
-            Some(json!({"p50_ms": p50_ms, "p99_ms": p99_ms}))
-        };
-        let stages = StageId::ALL.into_iter().zip(of_stages);
-        let stages = stages.filter_map(|(stage, (hand_over, work))| {
-            let (hand_over, work) = (percentiles(hand_over)?, percentiles(work)?);
-            Some(json!({"stage": stage.name(), "hand_over": hand_over, "work": work}))
-        });
-        let sensor_to_pose = self.poses.iter().map(Item::sensor_to_pose_ns);
-        let none = || json!({"p50_ms": 0.0, "p99_ms": 0.0});
-        json!({
-            "samples": self.poses.len(),
-            "sensor_to_pose": percentiles(sensor_to_pose.collect()).unwrap_or_else(none),
-            "stages": stages.collect::<Vec<_>>(),
-            "series": self.series(now_ns),
-        })
-    }
-
-    /// Returns median and maximum of sensor to pose in each second, oldest first: a second has too
-    /// few poses for a percentile beyond. The last second is not over, and is left out.
-    fn series(&self, now_ns: i64) -> Vec<Option<Value>> {
-        let steps = WINDOW_NS / STEP_NS;
-        let mut of_step = vec![Vec::new(); steps as usize];
-        let end = now_ns / STEP_NS;
-        for item in &self.poses {
-            let step = finished_ns(item) / STEP_NS - (end - steps);
-            if (0..steps).contains(&step) {
-                of_step[step as usize].push(item.sensor_to_pose_ns());
-            }
-        }
-        let second = |delays_ns| {
-            let [p50_ms, max_ms] = at(delays_ns, [0.5, 1.0])?;
-            Some(json!({"p50_ms": p50_ms, "max_ms": max_ms}))
-        };
-        of_step.into_iter().map(second).collect()
-    }
+    let second = |delays_ns| {
+        let [p50_ms, max_ms] = at(delays_ns, [0.5, 1.0])?;
+        Some(json!({"p50_ms": p50_ms, "max_ms": max_ms}))
+    };
+    of_step.into_iter().map(second).collect()
 }
 
 /// Returns the end of the last work on an item.
@@ -116,38 +93,31 @@ mod tests {
 
     #[test]
     fn delays_are_those_of_the_last_minute() {
-        let mut delays = Delays::default();
         let now_ns = 200 * STEP_NS + STEP_NS / 2;
-        delays.add(&pose(now_ns - WINDOW_NS - 1, 900));
-        for second in 1..=50 {
-            delays.add(&pose(now_ns - second * STEP_NS, second));
-        }
-        let report = delays.report(now_ns);
-        assert_eq!(report["samples"], 50);
-        assert_eq!(report["sensor_to_pose"]["p99_ms"], 50.0);
-        let series = |report: &Value| report["series"].as_array().cloned().unwrap_or_default();
-        let seconds = series(&report);
+        let mut items = vec![pose(now_ns - WINDOW_NS - 1, 900)];
+        items.extend((1..=50).map(|second| pose(now_ns - second * STEP_NS, second)));
+        let found = report(items.iter(), now_ns);
+        assert_eq!(found["samples"], 50);
+        assert_eq!(found["sensor_to_pose"]["p99_ms"], 50.0);
+        let seconds_of = |report: &Value| report["series"].as_array().cloned().unwrap_or_default();
+        let seconds = seconds_of(&found);
         let seen = seconds.iter().filter(|second| !second.is_null());
         assert_eq!((seconds.len(), seen.count()), (60, 50));
         assert_eq!(seconds[59], json!({"p50_ms": 1.0, "max_ms": 1.0}));
-        let later = delays.report(now_ns + 2 * WINDOW_NS);
+        let later = report(items.iter(), now_ns + 2 * WINDOW_NS);
         assert_eq!(later["samples"], 0);
-        assert_eq!(series(&later), vec![Value::Null; 60]);
-        (0..10_000).for_each(|k| delays.add(&pose(k * 1_000_000, 1)));
-        assert_eq!(delays.report(10_000_000_000)["samples"], MAX_POSES);
+        assert_eq!(seconds_of(&later), vec![Value::Null; 60]);
     }
 
     #[test]
     fn each_stage_of_the_run_has_its_hand_over_and_its_work() {
-        let mut delays = Delays::default();
-        delays.add(&pose(STEP_NS, 5));
-        let report = delays.report(STEP_NS);
-        let [first, second] = [0, 1].map(|index| &report["stages"][index]);
+        let found = report([pose(STEP_NS, 5)].iter(), STEP_NS);
+        let [first, second] = [0, 1].map(|index| &found["stages"][index]);
         assert_eq!(
             [&first["stage"], &second["stage"]],
             ["masking", "pose-integration"]
         );
-        assert_eq!(report["stages"][2], Value::Null);
+        assert_eq!(found["stages"][2], Value::Null);
         // Published 0.7 ms after its receipt at -2 ms, received at -0.6 ms, begun 0.1 ms later.
         assert_eq!(second["hand_over"]["p50_ms"], 0.8);
         assert_eq!(second["work"]["p50_ms"], 0.5);
