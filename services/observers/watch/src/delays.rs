@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
+
 /// Returns the percentiles of the poses of the last minute, ms: of sensor to pose, and of each stage
 /// the hand-over, from the publication by the stage before to the start of the work, and the work.
 pub fn report<'a>(items: impl Iterator<Item = &'a Item>, now_ns: i64) -> Value {
@@ -112,7 +113,7 @@ mod tests {
     #[test]
     fn each_stage_of_the_run_has_its_hand_over_and_its_work() {
         let found = report([pose(STEP_NS, 5)].iter(), STEP_NS);
-        let [first, second] = [0, 1].map(|index| &found["stages"][index]);
+        let [first, second] = [0_usize, 1].map(|index| &found["stages"][index]);
         assert_eq!(
             [&first["stage"], &second["stage"]],
             ["masking", "pose-integration"]
