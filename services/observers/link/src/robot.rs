@@ -40,7 +40,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         launch,
         stages,
         journal,
-        poses: VecDeque::new(),
+        next_pose: 0,
         sent: VecDeque::new(),
         session,
         waker,
@@ -57,8 +57,8 @@ struct Robot<'a> {
     config: LinkConfig,
     stages: LastStages<'a>,
     journal: Journal,
-    /// The newest poses, to be published again.
-    poses: VecDeque<PoseHeader>,
+    /// The number of the first pose that is not in the journal.
+    next_pose: u64,
     /// The newest items of the cut, with their times on this machine.
     sent: VecDeque<Item>,
     session: Session,
@@ -80,12 +80,16 @@ impl Robot<'_> {
             "report the size of the scans",
             move || bytes,
         )?;
-        let poses = self.journal.last(self.stages.history().max(1));
-        let (poses, ended) = poses.map_err(StageError::input)?;
-        self.poses = poses.into();
+        let (poses, ended) = self.last_poses()?;
+        let newest = poses.last().map(|pose| pose.item);
         if ended {
-            return self.repeat_end();
+            // The run has ended before, and only its results are missing.
+            self.stages.republish(&poses)?;
+            self.stages.end(newest.unwrap_or_default())?;
+            while !self.sleep()? {}
+            return Ok(());
         }
+        self.next_pose = newest.map_or(0, |item| item.seq.saturating_add(1));
         let Some(received) = self.begin()? else {
             return Ok(());
         };
@@ -93,24 +97,15 @@ impl Robot<'_> {
         if !self.catch_up(&poses, received)? {
             return Ok(());
         }
-        self.stages.republish(self.poses.make_contiguous())?;
+        self.stages.republish(&self.last_poses()?.0)?;
         self.stages.has_handed_over(0)?;
         self.relay(&poses)
     }
 
-    /// Publishes the end again: the run has ended before, and only its results are missing.
-    fn repeat_end(&mut self) -> Result<(), StageError> {
-        self.stages.republish(self.poses.make_contiguous())?;
-        let newest = self.poses.back().map(|pose| pose.item);
-        self.stages.end(newest.unwrap_or_default())?;
-        while !self.sleep()? {}
-        Ok(())
-    }
-
-    /// Returns the number of the first pose that is not in the journal.
-    fn next_pose(&self) -> u64 {
-        let newest = self.poses.back();
-        newest.map_or(0, |pose| pose.item.seq.saturating_add(1))
+    /// Returns the newest poses of the journal, to be published again, and whether it has ended.
+    fn last_poses(&self) -> Result<(Vec<PoseHeader>, bool), StageError> {
+        let poses = self.journal.last(self.stages.history().max(1));
+        poses.map_err(StageError::input)
     }
 
     /// Asks the base where to continue until it answers; returns the number of items that have
@@ -140,7 +135,7 @@ impl Robot<'_> {
     }
 
     fn check_start(&self, received: u64) -> Result<(), StageError> {
-        let (poses, base) = (self.next_pose(), received);
+        let (poses, base) = (self.next_pose, received);
         let window = self.launch.manifest.window.scans as u64;
         match self.config.cut {
             _ if base < poses => Err(StageError::Input(format!(
@@ -158,12 +153,12 @@ impl Robot<'_> {
 
     /// Journals the poses of all items of an earlier start; false on a request to stop.
     fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, StageError> {
-        while self.next_pose() < received {
+        while self.next_pose < received {
             self.waker.clear();
             while let Some(bytes) = poses.next() {
                 self.journal(&bytes)?;
             }
-            if self.next_pose() < received && self.sleep()? {
+            if self.next_pose < received && self.sleep()? {
                 return Ok(false);
             }
         }
@@ -201,8 +196,8 @@ impl Robot<'_> {
                     self.stages.publish_pose(pose)?;
                 }
             }
-            connection.update(poses.is_connected(), self.next_pose());
-            if let Some(end) = end.filter(|end| !has_ended && self.next_pose() == end.seq) {
+            connection.update(poses.is_connected(), self.next_pose);
+            if let Some(end) = end.filter(|end| !has_ended && self.next_pose == end.seq) {
                 has_ended = self.end(&end, &sent, poses)?;
             }
             if self.sleep()? {
@@ -241,7 +236,7 @@ impl Robot<'_> {
     /// Journals a pose; `None` if it was there already.
     fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, StageError> {
         let mut pose = self.checked::<Pose, PoseHeader>(bytes)?;
-        let (expected, got) = (self.next_pose(), pose.item.seq);
+        let (expected, got) = (self.next_pose, pose.item.seq);
         if got < expected || pose.item.is(flag::END) {
             return Ok(None);
         }
@@ -255,9 +250,7 @@ impl Robot<'_> {
         }
         pose.item = self.timed(pose.item);
         self.journal.append(&pose).map_err(StageError::input)?;
-        self.poses.push_back(pose);
-        let history = self.stages.history().max(1);
-        self.poses.drain(..self.poses.len().saturating_sub(history));
+        self.next_pose = got.saturating_add(1);
         Ok(Some(pose))
     }
 
@@ -286,7 +279,7 @@ impl Robot<'_> {
     /// Ends this side once the base requests what follows the end; false before.
     fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, StageError> {
         // The base ends when it knows that all poses are here, and that this side knows of its end.
-        poses.confirm(self.next_pose());
+        poses.confirm(self.next_pose);
         let has_end = |sent: &SentTopic| sent.offer.answered() > end.seq;
         if !sent.iter().all(has_end) {
             return Ok(false);
@@ -312,7 +305,7 @@ impl Robot<'_> {
     fn fetch(&self, topic: &str) -> Fetcher {
         let request = Request {
             key: format!("{}/{topic}", handshake::prefix(&self.config, Side::Base)),
-            from: self.next_pose(),
+            from: self.next_pose,
             generation: None,
             receiver: self.session.zid().to_string(),
             priority: Priority::InteractiveHigh,
