@@ -69,7 +69,6 @@ fn follow<M: Message>(
         let mut drawn: Option<Instant> = None;
         while !followed.view.is_stopping() {
             let published = follow_topic::<M>(&followed, &is_wanted, |message, _| {
-                let Some(message) = message else { return };
                 let item = message.item();
                 for view in views(M::TOPIC, bytes_of(message.header())) {
                     hub.publish(view.channel, item.stamp_ns, view.data);
