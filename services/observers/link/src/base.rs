@@ -5,7 +5,6 @@
 //! robot's source: while the link is cut, no credit arrives.
 
 use std::{
-    collections::VecDeque,
     sync::{
         Arc,
         mpsc::{Receiver, channel},
@@ -93,7 +92,7 @@ struct ToRobot {
 struct FromRobot {
     fetcher: Fetcher,
     header_bytes: usize,
-    messages: VecDeque<RecordedMessage>,
+    next: Option<RecordedMessage>,
 }
 
 impl Base<'_> {
@@ -115,7 +114,6 @@ impl Base<'_> {
                     topics = self.fetch(self.published.map_or(start, |newest| newest + 1));
                 }
             }
-            topics.iter_mut().try_for_each(FromRobot::receive)?;
             while end.is_none() && self.publish(&mut topics, &to_robot, &mut end)? {}
             self.confirm(end.as_ref(), &topics);
             let is_connected = topics.iter().all(|topic| topic.fetcher.is_connected());
@@ -229,7 +227,7 @@ impl Base<'_> {
             FromRobot {
                 fetcher: Fetcher::start(&self.session, request, self.waker.clone()),
                 header_bytes: topic(name).map_or(0, |topic| topic.header.bytes),
-                messages: VecDeque::new(),
+                next: None,
             }
         });
         topics.collect()
@@ -292,7 +290,8 @@ impl Base<'_> {
         to_robot: &ToRobot,
         end: &mut Option<Item>,
     ) -> Result<bool, StageError> {
-        let items = topics.iter().map(|topic| topic.messages.front()?.item());
+        topics.iter_mut().try_for_each(FromRobot::receive)?;
+        let items = topics.iter().map(|topic| topic.next.as_ref()?.item());
         let Some(items) = items.collect::<Option<Vec<Item>>>() else {
             return Ok(false);
         };
@@ -345,14 +344,13 @@ impl Base<'_> {
 
 impl FromRobot {
     fn take(&mut self, seq: u64) -> Option<RecordedMessage> {
-        let first = self.messages.front()?.item();
-        let is_next = first.is_some_and(|it| it.seq == seq);
-        is_next.then(|| self.messages.pop_front())?
+        let is_next = |next: &mut RecordedMessage| next.item().is_some_and(|it| it.seq == seq);
+        self.next.take_if(is_next)
     }
 
     fn receive(&mut self) -> Result<(), StageError> {
-        while let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? {
-            self.messages.push_back(message);
+        if self.next.is_none() {
+            self.next = self.fetcher.next_with_payload(self.header_bytes)?;
         }
         Ok(())
     }
