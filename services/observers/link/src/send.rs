@@ -84,7 +84,6 @@ pub(crate) struct RunOffer {
 pub(crate) struct OfferedTopic {
     pub name: String,
     pub version: String,
-    pub is_lossless: bool,
 }
 
 pub(crate) fn prefix(name: &str, sender: &str) -> String {
@@ -255,7 +254,7 @@ fn buffer(
 }
 
 /// Returns whether no message of a topic may be missed: all but the large ones with payloads.
-fn is_lossless(topic: &str) -> bool {
+pub(crate) fn is_lossless(topic: &str) -> bool {
     topic != Scan::TOPIC && topic != Masked::TOPIC
 }
 
@@ -294,7 +293,6 @@ fn offer(
     let offered = |name: &&'static str| OfferedTopic {
         name: (*name).to_owned(),
         version: topic(name).map_or("", |topic| topic.header.name).to_owned(),
-        is_lossless: is_lossless(name),
     };
     let run = RunOffer {
         window: manifest.window,

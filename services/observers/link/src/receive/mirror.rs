@@ -12,7 +12,7 @@ use crate::{
     error::other_version,
     fetch::{Fetcher, Request},
     request::Answers,
-    send::{OfferedTopic, RunOffer, began_ns, offer_key, prefix},
+    send::{OfferedTopic, RunOffer, began_ns, is_lossless, offer_key, prefix},
     waker::Waker,
 };
 
@@ -50,11 +50,11 @@ impl Mirror<'_> {
         Ok(MirroredTopic {
             name: topic.name,
             header_bytes: topic.header.bytes,
-            fetcher: self.fetch(topic.name, from, 0, offered.is_lossless),
+            fetcher: self.fetch(topic.name, from, 0),
             feed: self.rig.feed(topic.name)?,
             sequence: Sequence::default(),
             count: ReceivedCount {
-                is_lossless: offered.is_lossless,
+                is_lossless: is_lossless(topic.name),
                 ..ReceivedCount::default()
             },
         })
@@ -62,14 +62,14 @@ impl Mirror<'_> {
 
     /// Requests the messages of a topic from a number on, and messages of later generations than
     /// this one.
-    fn fetch(&self, topic: &str, from: u64, generation: u32, is_lossless: bool) -> Fetcher {
+    fn fetch(&self, topic: &str, from: u64, generation: u32) -> Fetcher {
         let request = Request {
             key: format!("{}/{topic}", prefix(&self.link, &self.offer.sender)),
             from,
             generation: Some(generation),
             receiver: self.receiver.clone(),
             // A scan takes long: poses go before it.
-            priority: match is_lossless {
+            priority: match is_lossless(topic) {
                 true => Priority::InteractiveHigh,
                 false => Priority::DataLow,
             },
@@ -124,8 +124,7 @@ impl Mirror<'_> {
                 Pose::TOPIC => self.next_pose,
                 _ => topic.sequence.next.unwrap_or_default(),
             };
-            let (generation, is_lossless) = (topic.sequence.generation, topic.count.is_lossless);
-            self.topics[place].fetcher = self.fetch(topic.name, from, generation, is_lossless);
+            self.topics[place].fetcher = self.fetch(topic.name, from, topic.sequence.generation);
         }
         Ok(())
     }
