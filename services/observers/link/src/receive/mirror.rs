@@ -53,10 +53,7 @@ impl Mirror<'_> {
             fetcher: self.fetch(topic.name, from, 0),
             feed: self.rig.feed(topic.name)?,
             sequence: Sequence::default(),
-            count: ReceivedCount {
-                is_lossless: is_lossless(topic.name),
-                ..ReceivedCount::default()
-            },
+            count: ReceivedCount::default(),
         })
     }
 
