@@ -105,7 +105,6 @@ pub fn receive(
         topics: Vec::new(),
         journal,
         next_pose,
-        answers: None,
         offer,
         waker: Waker::new()?,
         rig,

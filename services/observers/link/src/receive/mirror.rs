@@ -11,7 +11,6 @@ use crate::{
     connection_log::ConnectionLog,
     error::other_version,
     fetch::{Fetcher, Request},
-    request::Answers,
     send::{OfferedTopic, RunOffer, began_ns, is_lossless, offer_key, prefix},
     waker::Waker,
 };
@@ -21,8 +20,6 @@ pub(super) struct Mirror<'a> {
     pub link: String,
     pub receiver: String,
     pub offer: RunOffer,
-    /// The answers to the question for another sender, while nothing arrives.
-    pub answers: Option<Answers>,
     pub topics: Vec<MirroredTopic>,
     /// The poses that have arrived: they are not requested again.
     pub journal: Journal,
@@ -76,19 +73,7 @@ impl Mirror<'_> {
 
     /// Asks for another sender, and continues with it if it sends the same drive.
     fn find_another_sender(&mut self) -> Result<(), StageError> {
-        let Some(answers) = &self.answers else {
-            let key = offer_key(&self.link);
-            self.answers = Some(ASK_FOR_RUN.send(&self.session, key, [])?);
-            return Ok(());
-        };
-        let reply = match answers.try_recv() {
-            Ok(None) => return Ok(()),
-            Ok(reply) => reply,
-            Err(_) => None,
-        };
-        self.answers = None;
-        let offer = reply.map(|reply| ASK_FOR_RUN.parse(reply)).transpose()?;
-        match offer.flatten() {
+        match ASK_FOR_RUN.ask(&self.session, offer_key(&self.link), [])? {
             Some(offer) => self.continue_with(offer),
             None => Ok(()),
         }
@@ -163,9 +148,8 @@ impl Mirror<'_> {
                 |topic: &MirroredTopic| topic.fetcher.is_connected() && !topic.fetcher.has_ended();
             let is_connected = self.topics.iter().any(is_live);
             connection.update(is_connected, self.next_pose);
-            match is_connected {
-                true => self.answers = None,
-                false => self.find_another_sender()?,
+            if !is_connected {
+                self.find_another_sender()?;
             }
             let feeds: Vec<&Feed> = self.topics.iter().map(|topic| &topic.feed).collect();
             for feed in &feeds {
