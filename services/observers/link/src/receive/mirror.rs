@@ -34,33 +34,34 @@ pub(super) struct MirroredTopic {
     pub fetcher: Fetcher,
     feed: Feed,
     sequence: Sequence,
-    count: ReceivedCount,
+    received: u64,
 }
 
 impl Mirror<'_> {
     pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, StageError> {
         let topic = topic(&offered.name).ok_or_else(|| other_version(ASK_FOR_RUN.1))?;
-        let from = match topic.name {
-            Pose::TOPIC => self.next_pose,
-            _ => 0,
-        };
+        let sequence = Sequence::default();
         Ok(MirroredTopic {
             name: topic.name,
             header_bytes: topic.header.bytes,
-            fetcher: self.fetch(topic.name, from, 0),
+            fetcher: self.fetch(topic.name, &sequence),
             feed: self.rig.feed(topic.name)?,
-            sequence: Sequence::default(),
-            count: ReceivedCount::default(),
+            sequence,
+            received: 0,
         })
     }
 
-    /// Requests the messages of a topic from a number on, and messages of later generations than
-    /// this one.
-    fn fetch(&self, topic: &str, from: u64, generation: u32) -> Fetcher {
+    /// Requests the messages of a topic behind those that are here, and messages of later
+    /// generations.
+    fn fetch(&self, topic: &str, here: &Sequence) -> Fetcher {
+        let from = match topic {
+            Pose::TOPIC => self.next_pose,
+            _ => here.next.unwrap_or_default(),
+        };
         let request = Request {
             key: format!("{}/{topic}", prefix(&self.link, &self.offer.sender)),
             from,
-            generation: Some(generation),
+            generation: Some(here.generation),
             receiver: self.receiver.clone(),
             // A scan takes long: poses go before it.
             priority: match is_lossless(topic) {
@@ -99,14 +100,9 @@ impl Mirror<'_> {
         self.offer = other;
         for place in 0..self.topics.len() {
             let topic = &self.topics[place];
-            if topic.fetcher.has_ended() {
-                continue;
+            if !topic.fetcher.has_ended() {
+                self.topics[place].fetcher = self.fetch(topic.name, &topic.sequence);
             }
-            let from = match topic.name {
-                Pose::TOPIC => self.next_pose,
-                _ => topic.sequence.next.unwrap_or_default(),
-            };
-            self.topics[place].fetcher = self.fetch(topic.name, from, topic.sequence.generation);
         }
         Ok(())
     }
@@ -163,8 +159,16 @@ impl Mirror<'_> {
     }
 
     fn received(&self, is_interrupted: bool) -> Received {
-        let topics = self.topics.iter();
-        let counts = topics.map(|topic| (topic.name.to_owned(), topic.count));
+        let counts = self.topics.iter().map(|topic| {
+            let missed = match topic.name {
+                // The numbers of corrections count the poses in them, and each replaces those
+                // before.
+                Correction::TOPIC => 0,
+                _ => topic.sequence.missed,
+            };
+            let received = topic.received;
+            (topic.name.to_owned(), ReceivedCount { received, missed })
+        });
         Received {
             is_interrupted,
             topics: counts.collect(),
@@ -173,18 +177,14 @@ impl Mirror<'_> {
 }
 
 impl MirroredTopic {
-    /// Returns the next message that has arrived, and counts those missed before it.
+    /// Returns the next message that has arrived, and counts it.
     fn next_message(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? else {
             return Ok(None);
         };
-        self.count.received += 1;
+        self.received += 1;
         if let Some(item) = message.item() {
             self.sequence.advance(&item);
-        }
-        // The numbers of corrections count the poses in them, and each replaces those before.
-        if self.name != Correction::TOPIC {
-            self.count.missed = self.sequence.missed;
         }
         Ok(Some(message))
     }
