@@ -53,7 +53,7 @@ fn limits(request: Duration, answers: Duration) -> Limits {
 }
 
 const LONG: Duration = Duration::from_secs(60);
-const SHORT: Duration = Duration::from_secs(2);
+const SHORT: Duration = Duration::from_secs(1);
 
 async fn answer(address: SocketAddr) -> Vec<u8> {
     let mut stream = TcpStream::connect(address).await.unwrap();
