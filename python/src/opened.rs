@@ -17,22 +17,10 @@ impl Opened {
         index: usize,
         slot: ScanSlot<'_>,
     ) -> Result<(SweepGeometry, Vec<Sample>), ReadError> {
-        let ScanSlot {
-            bytes,
-            azimuth_rad,
-            stamp_ns,
-            flags,
-        } = slot;
-        let geometry = self.scans.read(
-            index,
-            ScanSlot {
-                bytes,
-                azimuth_rad,
-                stamp_ns: &mut *stamp_ns,
-                flags,
-            },
-        )?;
-        let stamps = stamp_ns[..geometry.azimuths].iter().copied();
+        let stamps = slot.stamp_ns;
+        let stamp_ns = &mut *stamps;
+        let geometry = self.scans.read(index, ScanSlot { stamp_ns, ..slot })?;
+        let stamps = stamps[..geometry.azimuths].iter().copied();
         let first = stamps.clone().min().unwrap_or(geometry.stamp_ns);
         let last = stamps.max().unwrap_or(geometry.stamp_ns);
         let samples = self.samples.of(self.scans.as_ref(), [first, last]);

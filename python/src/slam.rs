@@ -1,15 +1,12 @@
 //! SLAM: loops, and the trajectory corrected by them.
 
-use std::convert::Infallible;
+use std::{convert::Infallible, error::Error};
 
-use gyre_estimation::EstimationError;
 use gyre_geometry::{Pose, SparsePoint, UncertainMotion};
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeBuilder, LoopCloser, SUBMAP_REACH_M, ScanPose,
-    TrajectoryEstimator,
+    Keyframe, KeyframeBuilder, LoopCloser, SUBMAP_REACH_M, ScanPose, TrajectoryEstimator,
 };
 use pyo3::prelude::*;
-use thiserror::Error;
 
 use crate::{
     config::Config, errors, lock::Guarded, masker, pose, registered::Registered,
@@ -52,7 +49,7 @@ struct State {
     builder: KeyframeBuilder,
     closer: LoopCloser,
     estimator: TrajectoryEstimator,
-    /// The keyframes with their points.
+    /// With their points.
     keyframes: Vec<Keyframe>,
     /// The poses of all scans by odometry.
     odometry: gyre_radar::Trajectory,
@@ -60,15 +57,7 @@ struct State {
     is_solved: bool,
 }
 
-#[derive(Debug, Error)]
-enum SlamError {
-    #[error(transparent)]
-    Closing(#[from] ClosingError<Infallible>),
-    #[error(transparent)]
-    Estimation(#[from] EstimationError),
-    #[error("the drive is finished: no scan comes after Slam.finish")]
-    Finished,
-}
+type Failure = Box<dyn Error + Send + Sync>;
 
 impl State {
     /// Takes the next scan. Returns whether it is a keyframe.
@@ -76,9 +65,9 @@ impl State {
         &mut self,
         scan: &Registered,
         points: impl FnOnce() -> Vec<SparsePoint>,
-    ) -> Result<bool, SlamError> {
+    ) -> Result<bool, Failure> {
         if self.is_finished {
-            return Err(SlamError::Finished);
+            return Err("the drive is finished: no scan comes after Slam.finish".into());
         }
         let (registered, stamp_ns) = (&scan.registered, scan.stamp_ns);
         let seq = self.odometry.len() as u64;
@@ -106,7 +95,7 @@ impl State {
     }
 
     /// Closes the loops of keyframes whose surroundings are known.
-    fn close(&mut self) -> Result<(), SlamError> {
+    fn close(&mut self) -> Result<(), Failure> {
         let keyframes = &self.keyframes;
         let mut read = |index: usize| Ok::<_, Infallible>(keyframes[index].clone());
         while self.closer.describe(&mut read)?.is_some() {}
@@ -117,14 +106,14 @@ impl State {
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<(), SlamError> {
+    fn finish(&mut self) -> Result<(), Failure> {
         self.is_finished = true;
         self.closer.finish();
         self.close()
     }
 
     /// Moves the keyframes to where they fit best to odometry and loops.
-    fn solve(&mut self) -> Result<(), SlamError> {
+    fn solve(&mut self) -> Result<(), Failure> {
         if !self.is_solved {
             self.estimator.solve()?;
             self.is_solved = true;
@@ -132,7 +121,7 @@ impl State {
         Ok(())
     }
 
-    fn loops(&mut self) -> Result<Vec<Loop>, SlamError> {
+    fn loops(&mut self) -> Result<Vec<Loop>, Failure> {
         self.solve()?;
         let seq = |keyframe: usize| self.keyframes[keyframe].seq;
         let judged = self.estimator.loops().iter().map(|judged| Loop {
@@ -145,7 +134,7 @@ impl State {
         Ok(judged.collect())
     }
 
-    fn corrected(&mut self) -> Result<gyre_radar::Trajectory, SlamError> {
+    fn corrected(&mut self) -> Result<gyre_radar::Trajectory, Failure> {
         self.solve()?;
         let correction = self.estimator.correction();
         let poses = (0..).zip(&self.odometry.poses);

@@ -2,7 +2,6 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use gyre_link::{ReceiveOptions, SendOptions};
 use gyre_messages::Footprint;
 use gyre_results::Out;
 use gyre_run::LinkConfig;
@@ -24,12 +23,8 @@ pub fn link(end: &LinkEnd) -> Result<ExitCode, Failure> {
 
 fn send(arguments: &SendArguments) -> Result<ExitCode, Failure> {
     let linger = seconds("--linger-s", arguments.linger_s)?;
-    let sent = gyre_link::send(&SendOptions {
-        out: arguments.out.clone(),
-        link: link_of(&arguments.network),
-        topics: arguments.topics.clone(),
-        linger,
-    })?;
+    let link = link_of(&arguments.network);
+    let sent = gyre_link::send(&arguments.out, &link, &arguments.topics, linger)?;
     print::note(format_args!("gyre link: {sent}"));
     if sent.is_incomplete {
         print::note(
@@ -57,13 +52,9 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
         link.name,
         out.path().display()
     ));
-    let options = ReceiveOptions {
-        out: out.path().to_owned(),
-        link,
-        gyre: own().to_string_lossy().into_owned(),
-        topics: arguments.topics.clone(),
-    };
-    let received = gyre_link::receive(&options, seen, &signals)?;
+    let gyre = own().to_string_lossy().into_owned();
+    let (out, topics) = (out.path(), &arguments.topics);
+    let received = gyre_link::receive(out, &link, topics, gyre, seen, &signals)?;
     print::note(format_args!("gyre link: {received}"));
     Ok(match received.is_complete() {
         _ if received.is_interrupted => ExitCode::from(INTERRUPTED),

@@ -5,10 +5,7 @@ use std::{path::Path, process::ExitCode};
 use gyre_configuration::Configuration;
 use gyre_datasets::DatasetOptions;
 use gyre_results::{absolute, map_options};
-use gyre_ros2_bridge::{
-    Bridge, MapSettings, Settings,
-    source::{self, AskError},
-};
+use gyre_ros2_bridge::{Bridge, MapSettings, Settings, source};
 use gyre_ros2_messages::Domain;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
@@ -62,13 +59,7 @@ fn map_settings(out: &Path) -> Result<MapSettings, String> {
 
 pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Failure> {
     let settings = source::Settings::of(source, options)?;
-    source::ask(&settings).map_err(|error: AskError| error.into())
-}
-
-/// Returns whether a driver that was asked in vain may still come.
-pub fn may_come(error: &Failure) -> bool {
-    let absent = error.downcast_ref::<AskError>();
-    absent.is_some_and(|it| it.may_pass)
+    Ok(source::ask(&settings)?)
 }
 
 pub fn receive(

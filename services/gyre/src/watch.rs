@@ -64,7 +64,8 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
         );
     }
     let signals = Signals::install()?;
-    Server { page, foxglove }.show(out, earlier::is_complete, &signals)?;
+    let shown = Server { page, foxglove }.show(out, earlier::is_complete, &signals);
+    shown.map_err(|error| format!("cannot serve: {error}"))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -5,7 +5,6 @@
 //! robot's source: while the link is cut, no credit arrives.
 
 use std::{
-    collections::VecDeque,
     sync::{
         Arc,
         mpsc::{Receiver, channel},
@@ -24,8 +23,8 @@ use zenoh::{
 };
 
 use crate::{
-    LinkError,
     connection_log::ConnectionLog,
+    error::{failed, other_version},
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
     replay_buffer::{LogBuffer, MemoryBuffer, ReplayBuffer},
@@ -45,7 +44,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let topics = config.cut.topics(manifest.refines, manifest.window.slam);
     let mut stages = FirstStages::open(launch, &topics, config.returns_motions())?;
     let waker = Waker::new()?;
-    let sleep = || Ok(stages.sleep(waker.descriptor())?);
+    let sleep = || stages.sleep(waker.descriptor());
     let Some(session) = session::open(&config, sleep)? else {
         return Ok(stages.counters());
     };
@@ -93,11 +92,11 @@ struct ToRobot {
 struct FromRobot {
     fetcher: Fetcher,
     header_bytes: usize,
-    messages: VecDeque<RecordedMessage>,
+    next: Option<RecordedMessage>,
 }
 
 impl Base<'_> {
-    fn work(&mut self) -> Result<(), LinkError> {
+    fn work(&mut self) -> Result<(), StageError> {
         let Some(start) = self.start()? else {
             return Ok(());
         };
@@ -115,7 +114,6 @@ impl Base<'_> {
                     topics = self.fetch(self.published.map_or(start, |newest| newest + 1));
                 }
             }
-            topics.iter_mut().try_for_each(FromRobot::receive)?;
             while end.is_none() && self.publish(&mut topics, &to_robot, &mut end)? {}
             self.confirm(end.as_ref(), &topics);
             let is_connected = topics.iter().all(|topic| topic.fetcher.is_connected());
@@ -163,7 +161,7 @@ impl Base<'_> {
 
     /// Waits until pose-integration has published the newest pose; returns the first item that the
     /// stages need. `None` on a request to stop.
-    fn start(&mut self) -> Result<Option<u64>, LinkError> {
+    fn start(&mut self) -> Result<Option<u64>, StageError> {
         loop {
             // Sleep first, as the source of scans does.
             if self.stages.sleep(self.waker.descriptor())? {
@@ -187,7 +185,7 @@ impl Base<'_> {
         }
     }
 
-    fn offer(&self) -> Result<ToRobot, LinkError> {
+    fn offer(&self) -> Result<ToRobot, StageError> {
         let manifest = &self.launch.manifest;
         let prefix = handshake::prefix(&self.config, Side::Base);
         let mut server = Server::new(&self.session, &prefix, Some(self.waker.clone()));
@@ -203,7 +201,7 @@ impl Base<'_> {
                 waker.wake();
             })
             .wait()
-            .map_err(|e| LinkError::zenoh("wait for the robot", &e))?;
+            .map_err(|e| failed("wait for the robot", &e))?;
         let pose_offer = server.offer(Pose::TOPIC, poses.clone())?;
         server.offer(Motion::TOPIC, motions.clone())?;
         Ok(ToRobot {
@@ -229,7 +227,7 @@ impl Base<'_> {
             FromRobot {
                 fetcher: Fetcher::start(&self.session, request, self.waker.clone()),
                 header_bytes: topic(name).map_or(0, |topic| topic.header.bytes),
-                messages: VecDeque::new(),
+                next: None,
             }
         });
         topics.collect()
@@ -245,7 +243,7 @@ impl Base<'_> {
         (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq)
     }
 
-    fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), LinkError> {
+    fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), StageError> {
         let newest = self.stages.newest_pose().max(self.resumed_at());
         let published = newest.map_or(0, |newest| newest.saturating_add(1));
         to_robot.poses.set_published(published);
@@ -256,14 +254,14 @@ impl Base<'_> {
     }
 
     /// Answers a robot that starts; true if it is admitted.
-    fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, LinkError> {
+    fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, StageError> {
         let ours = Agreement::of(&self.launch.manifest, &self.config, &self.topics);
         let bytes = query.payload().map(|payload| payload.to_bytes());
         let theirs = serde_json::from_slice::<Agreement>(&bytes.unwrap_or_default());
         let drive = theirs.as_ref().ok().and_then(|theirs| theirs.drive.clone());
         let is_other = self.drive.is_some() && drive != self.drive && self.next() > 0;
         let answer = match theirs.map(|theirs| ours.difference(&theirs)) {
-            Err(_) => StartAnswer::Refused(LinkError::other_version("the base").to_string()),
+            Err(_) => StartAnswer::Refused(other_version("the base").to_string()),
             Ok(Some(difference)) => StartAnswer::Refused(difference),
             Ok(None) if is_other => StartAnswer::Refused(
                 "the base has poses of a different drive: begin both anew with --fresh".to_owned(),
@@ -276,7 +274,7 @@ impl Base<'_> {
         if let StartAnswer::Refused(why) = &answer {
             tracing::warn!("a robot was refused: {why}");
         }
-        let text = serde_json::to_vec(&answer).map_err(|e| LinkError::zenoh("answer", &e))?;
+        let text = serde_json::to_vec(&answer).map_err(|e| failed("answer", &e))?;
         let replied = query.reply(handshake::start_key(&self.config), text).wait();
         let is_admitted = replied.is_ok() && matches!(answer, StartAnswer::Go(_));
         if is_admitted {
@@ -291,8 +289,9 @@ impl Base<'_> {
         topics: &mut [FromRobot],
         to_robot: &ToRobot,
         end: &mut Option<Item>,
-    ) -> Result<bool, LinkError> {
-        let items = topics.iter().map(|topic| topic.messages.front()?.item());
+    ) -> Result<bool, StageError> {
+        topics.iter_mut().try_for_each(FromRobot::receive)?;
+        let items = topics.iter().map(|topic| topic.next.as_ref()?.item());
         let Some(items) = items.collect::<Option<Vec<Item>>>() else {
             return Ok(false);
         };
@@ -302,7 +301,7 @@ impl Base<'_> {
         self.check_next(&item, &items)?;
         if item.is(flag::END) {
             // The base ends after the robot has all poses, the robot after the base has the end.
-            if to_robot.pose_offer.asked() < item.seq {
+            if to_robot.pose_offer.answered() < item.seq {
                 return Ok(false);
             }
             self.stages.end(item)?;
@@ -321,12 +320,12 @@ impl Base<'_> {
 
     /// Checks that the next item follows the published ones, and is of the same drive. After a
     /// start some topics may lack an item that was published before.
-    fn check_next(&self, item: &Item, all: &[Item]) -> Result<(), LinkError> {
+    fn check_next(&self, item: &Item, all: &[Item]) -> Result<(), StageError> {
         let begins = self.published.is_none() && item.seq < self.next();
         let is_whole = all.iter().all(|other| other.seq == item.seq);
         let follows = is_whole && item.seq == self.next();
         if !begins && !follows {
-            return Err(LinkError::Refused(format!(
+            return Err(StageError::Input(format!(
                 "the robot sends item {}, but this run needs {}, which the robot no longer has: begin both anew with --fresh",
                 item.seq,
                 self.next()
@@ -334,7 +333,7 @@ impl Base<'_> {
         }
         let is_resumed = self.resumed_at() == Some(item.seq);
         match is_resumed && item.stamp_ns != self.resumed.stamp_ns {
-            true => Err(LinkError::Refused(format!(
+            true => Err(StageError::Input(format!(
                 "the robot's scan {} is not the one that this run has a pose of: it plays a different drive; begin both anew with --fresh",
                 item.scan
             ))),
@@ -345,14 +344,13 @@ impl Base<'_> {
 
 impl FromRobot {
     fn take(&mut self, seq: u64) -> Option<RecordedMessage> {
-        let first = self.messages.front()?.item();
-        let is_next = first.is_some_and(|it| it.seq == seq);
-        is_next.then(|| self.messages.pop_front())?
+        let is_next = |next: &mut RecordedMessage| next.item().is_some_and(|it| it.seq == seq);
+        self.next.take_if(is_next)
     }
 
-    fn receive(&mut self) -> Result<(), LinkError> {
-        while let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? {
-            self.messages.push_back(message);
+    fn receive(&mut self) -> Result<(), StageError> {
+        if self.next.is_none() {
+            self.next = self.fetcher.next_with_payload(self.header_bytes)?;
         }
         Ok(())
     }

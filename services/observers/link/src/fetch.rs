@@ -11,7 +11,7 @@ use std::{
 };
 
 use gyre_messages::{Item, flag};
-use gyre_stage::source::RecordedMessage;
+use gyre_stage::{StageError, source::RecordedMessage};
 use zenoh::{
     Session, Wait,
     qos::{CongestionControl, Priority},
@@ -19,7 +19,6 @@ use zenoh::{
 };
 
 use crate::{
-    LinkError,
     patience::Patience,
     serve::{DONE, ENDED, FROM, GENERATION, RECEIVER, REQUEST_LIFETIME},
     waker::Waker,
@@ -104,13 +103,13 @@ impl Fetcher {
     pub fn next_with_payload(
         &self,
         header_bytes: usize,
-    ) -> Result<Option<RecordedMessage>, LinkError> {
+    ) -> Result<Option<RecordedMessage>, StageError> {
         let Some(mut header) = self.next() else {
             return Ok(None);
         };
         if header.len() < header_bytes {
             let reason = format!("a message of {} bytes is too short", header.len());
-            return Err(LinkError::Refused(reason));
+            return Err(StageError::Input(reason));
         }
         let payload = header.split_off(header_bytes);
         Ok(Some(RecordedMessage { header, payload }))

@@ -5,11 +5,11 @@ use std::{fs, path::Path, thread, time::Duration};
 
 use gyre_messages::{Limits, topic};
 use gyre_run::{BEGUN_WITH, LinkConfig, Side};
-use gyre_stage::Manifest;
+use gyre_stage::{Manifest, StageError};
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
-use crate::{LinkError, request::Question, session};
+use crate::{error::failed, request::Question, session};
 
 /// Time between two questions before a run exists, whose own waits take over.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -35,13 +35,13 @@ pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
 
 /// Waits for the robot and asks for the bytes of its largest scan, which a base needs that receives
 /// scans.
-pub fn ask_robot(config: &LinkConfig) -> Result<usize, LinkError> {
+pub fn ask_robot(config: &LinkConfig) -> Result<usize, StageError> {
     let pause = || {
         thread::sleep(PAUSE);
         Ok(false)
     };
     let session = session::open(config, pause)?;
-    let failed = || LinkError::zenoh(ASK_FOR_SCANS.0, &"it was interrupted");
+    let failed = || failed(ASK_FOR_SCANS.0, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {
         if let Some(bytes) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
@@ -61,7 +61,8 @@ pub(crate) struct Agreement {
     window: usize,
     look_back: usize,
     limits: Limits,
-    topics: Vec<(String, String)>,
+    /// The versions of the messages that cross the link.
+    topics: Vec<String>,
     /// The checksum of the robot's recording, if it plays one.
     pub drive: Option<String>,
 }
@@ -77,11 +78,8 @@ pub(crate) enum StartAnswer {
 
 impl Agreement {
     pub fn of(manifest: &Manifest, config: &LinkConfig, topics: &[&'static str]) -> Self {
-        let versioned = |name: &&'static str| {
-            let version = topic(name).map_or("", |topic| topic.header.name);
-            ((*name).to_owned(), version.to_owned())
-        };
         let topics = topics.iter().chain(&["motion", "pose"]);
+        let versions = topics.filter_map(|name| Some(topic(name)?.header.name.to_owned()));
         Self {
             cut: config.cut.name().to_owned(),
             live: manifest.live,
@@ -89,13 +87,13 @@ impl Agreement {
             window: manifest.window.scans,
             look_back: manifest.window.look_back,
             limits: manifest.limits,
-            topics: topics.map(versioned).collect(),
+            topics: versions.collect(),
             drive: drive(&manifest.out),
         }
     }
 
     /// Returns the properties by the names that a user knows.
-    fn properties(&self) -> [(&'static str, String); 9] {
+    fn properties(&self) -> [(&'static str, String); 10] {
         let limits = &self.limits;
         let mode = if self.live { "live" } else { "lossless" };
         let look_back = self.look_back.to_string();
@@ -109,26 +107,16 @@ impl Agreement {
             ("the number of scans of a mask", limits.rasters.to_string()),
             ("refinement", self.refines.to_string()),
             ("the scans that stages look back", look_back),
+            // A topic that only one side has would be waited for to the end.
+            ("the list of topics", self.topics.join(", ")),
         ]
-    }
-
-    fn version_of(&self, topic: &str) -> String {
-        let found = self.topics.iter().find(|(name, _)| name == topic);
-        found.map_or("none", |(_, version)| version).to_owned()
     }
 
     /// Returns a sentence that explains why the robot's side belongs to a different run; `None` if
     /// it is not.
     pub fn difference(&self, robot: &Self) -> Option<String> {
-        let properties = robot.properties().into_iter().zip(self.properties());
-        let properties = properties.map(|((key, robot), (_, base))| (key.to_owned(), robot, base));
-        // A topic that only one side has would be waited for to the end.
-        let topics = self.topics.iter().chain(&robot.topics).map(|(name, _)| {
-            let key = format!("topic `{name}`");
-            (key, robot.version_of(name), self.version_of(name))
-        });
-        let mut all = properties.chain(topics);
-        let (key, robot, base) = all.find(|(_, robot, base)| robot != base)?;
+        let mut properties = robot.properties().into_iter().zip(self.properties());
+        let ((key, robot), (_, base)) = properties.find(|(robot, base)| robot != base)?;
         Some(format!(
             "{key} is {robot} on the robot and {base} on the base: give both the same"
         ))
@@ -147,8 +135,8 @@ pub(crate) fn ask_base(
     session: &Session,
     config: &LinkConfig,
     agreement: &Agreement,
-) -> Result<Option<StartAnswer>, LinkError> {
+) -> Result<Option<StartAnswer>, StageError> {
     let payload = serde_json::to_vec(agreement);
-    let payload = payload.map_err(|e| LinkError::zenoh(ASK_FOR_START.0, &e))?;
+    let payload = payload.map_err(|e| failed(ASK_FOR_START.0, &e))?;
     ASK_FOR_START.ask(session, start_key(config), payload)
 }

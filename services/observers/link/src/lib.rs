@@ -40,14 +40,13 @@ mod tests;
 #[cfg(feature = "zenoh")]
 mod waker;
 
-pub use network::{NetworkError, ONE_THREAD, check};
+pub use network::{ONE_THREAD, check};
 
 #[cfg(feature = "zenoh")]
 pub use {
     base::run as run_base,
-    error::LinkError,
     handshake::ask_robot,
-    receive::{ReceiveOptions, Received, ask, receive},
+    receive::{Received, ask, receive},
     robot::run as run_robot,
-    send::{SendOptions, Sent, send},
+    send::{Sent, send},
 };

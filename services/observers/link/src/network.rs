@@ -3,37 +3,33 @@
 use std::net::IpAddr;
 
 use gyre_run::LinkConfig;
-use thiserror::Error;
+use gyre_stage::StageError;
 
 /// The environment variable, and its value, that make zenoh do all its work in one thread.
 ///
 /// By default zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which
 /// the connection does not allow (eclipse-zenoh/zenoh#2557): under load it breaks within seconds.
-/// Set it before the program starts; TLS is refused without.
+/// Set it before the program starts.
 pub const ONE_THREAD: (&str, &str) = (
     "ZENOH_RUNTIME",
     "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))",
 );
-
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{0}")]
-pub struct NetworkError(String);
 
 /// The suffixes of names that no public authority certifies: private zones, and names reserved for
 /// documents.
 const PRIVATE_ZONES: &str = ".internal .lan .local .home.arpa .test .example .localhost";
 
 /// Checks the endpoints, and that the files of TLS can be read.
-pub fn check(link: &LinkConfig) -> Result<(), NetworkError> {
+pub fn check(link: &LinkConfig) -> Result<(), StageError> {
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if link.name.is_empty() || !link.name.chars().all(is_word) {
-        return Err(NetworkError(format!(
+        return Err(StageError::Input(format!(
             "`{}` is no name of a link: it has letters, digits, `-` and `_`",
             link.name
         )));
     }
     if link.listen.is_empty() && link.connect.is_empty() {
-        return Err(NetworkError(
+        return Err(StageError::Input(
             "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447".to_owned(),
         ));
     }
@@ -45,35 +41,35 @@ pub fn check(link: &LinkConfig) -> Result<(), NetworkError> {
     // A side that connects also trusts the public authorities (zenoh adds `ca` to them), whose
     // certificates others can have.
     match link.connect.iter().find(|endpoint| is_public(endpoint)) {
-        Some(endpoint) => Err(NetworkError(format!(
+        Some(endpoint) => Err(StageError::Input(format!(
             "{endpoint} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
         ))),
         None => Ok(()),
     }
 }
 
-fn check_certificates(link: &LinkConfig, endpoint: &str) -> Result<(), NetworkError> {
+fn check_certificates(link: &LinkConfig, endpoint: &str) -> Result<(), StageError> {
     for (what, path) in [
         ("the authority's certificate (ca)", &link.ca),
         ("a certificate (certificate)", &link.certificate),
         ("a private key (key)", &link.key),
     ] {
         if path.as_os_str().is_empty() {
-            return Err(NetworkError(format!(
+            return Err(StageError::Input(format!(
                 "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
             )));
         }
         std::fs::read(path).map_err(|reason| {
             let path = path.display();
-            NetworkError(format!("{what} {path} cannot be read: {reason}"))
+            StageError::Input(format!("{what} {path} cannot be read: {reason}"))
         })?;
     }
     Ok(())
 }
 
-fn is_tls(endpoint: &str) -> Result<bool, NetworkError> {
+fn is_tls(endpoint: &str) -> Result<bool, StageError> {
     let malformed = || {
-        NetworkError(format!(
+        StageError::Input(format!(
             "`{endpoint}` is no endpoint: it is tls/HOST:PORT, or on this machine tcp/127.0.0.1:PORT"
         ))
     };
@@ -89,7 +85,7 @@ fn is_tls(endpoint: &str) -> Result<bool, NetworkError> {
     match protocol {
         "tls" => Ok(true),
         "tcp" if is_loopback(host) => Ok(false),
-        "tcp" => Err(NetworkError(format!(
+        "tcp" => Err(StageError::Input(format!(
             "{endpoint} would leave this machine unencrypted, and anybody could connect: use tls/ with certificates (docs/link.md); tcp/ is for loopback addresses alone"
         ))),
         _ => Err(malformed()),
@@ -135,18 +131,22 @@ mod tests {
         }
     }
 
+    fn refusal(network: &LinkConfig) -> String {
+        check(network).unwrap_err().to_string()
+    }
+
     #[test]
     fn endpoints_are_tls_or_on_this_machine_and_smuggle_no_settings_of_zenoh_in() {
         let (plain, malformed) = ("would leave this machine unencrypted", "is no endpoint");
         for endpoint in ["tcp/127.0.0.1:7447", "tcp/127.1.2.3:1", "tcp/[::1]:7447"] {
-            assert_eq!(check(&listening(endpoint)), Ok(()), "{endpoint}");
+            assert!(check(&listening(endpoint)).is_ok(), "{endpoint}");
         }
         let off = "tcp/0.0.0.0:1 tcp/[::]:1 tcp/192.168.0.1:1 tcp/localhost:1";
         let others = " 7447 udp/127.0.0.1:7447 tls/:7447 tls/base tls/base:port";
         let smuggling = "tls/base:7447#enable_mtls=false tcp/127.0.0.1:7447?rel=0";
         for (endpoints, words) in [(off, plain), (others, malformed), (smuggling, malformed)] {
             for endpoint in endpoints.split(' ') {
-                let refused = check(&listening(endpoint)).unwrap_err().0;
+                let refused = refusal(&listening(endpoint));
                 assert!(refused.contains(words), "{endpoint}: {refused}");
             }
         }
@@ -161,16 +161,15 @@ mod tests {
             path
         };
         let mut network = listening("tls/0.0.0.0:7447");
-        let lacks = |network: &LinkConfig| check(network).unwrap_err().0;
-        assert!(lacks(&network).contains("(ca)"));
+        assert!(refusal(&network).contains("(ca)"));
         network.ca = file("ca.pem");
-        assert!(lacks(&network).contains("(certificate)"));
+        assert!(refusal(&network).contains("(certificate)"));
         network.certificate = file("robot.pem");
-        assert!(lacks(&network).contains("(key)"));
+        assert!(refusal(&network).contains("(key)"));
         network.key = folder.path().join("missing.key");
-        assert!(lacks(&network).contains("cannot be read"));
+        assert!(refusal(&network).contains("cannot be read"));
         network.key = file("robot.key");
-        assert_eq!(check(&network), Ok(()));
+        assert!(check(&network).is_ok());
     }
 
     #[test]
@@ -192,7 +191,7 @@ mod tests {
             key: path(),
             ..LinkConfig::default()
         };
-        assert!(check(&network).unwrap_err().0.contains("public name"));
+        assert!(refusal(&network).contains("public name"));
     }
 
     #[test]
@@ -200,10 +199,10 @@ mod tests {
         for name in ["", "a/b", "*", "rob ot"] {
             let mut network = listening("tcp/127.0.0.1:7447");
             network.name = name.to_owned();
-            assert!(check(&network).unwrap_err().0.contains("is no name"));
+            assert!(refusal(&network).contains("is no name"));
         }
         let mut nowhere = listening("");
         nowhere.listen.clear();
-        assert!(check(&nowhere).unwrap_err().0.contains("no endpoint"));
+        assert!(refusal(&nowhere).contains("no endpoint"));
     }
 }

@@ -14,12 +14,12 @@ use std::{
 use gyre_journal::{self as journal, Journal};
 use gyre_messages::topic;
 use gyre_run::LinkConfig;
-use gyre_stage::{Manifest, launch, wake::Signals};
+use gyre_stage::{Manifest, StageError, launch, wake::Signals};
 use gyre_supervise::rig::Rig;
 use zenoh::{Session, Wait};
 
 use crate::{
-    LinkError,
+    error::other_version,
     request::Question,
     send::{OfferedTopic, RunOffer, began_ns, offer_key},
     session,
@@ -34,23 +34,14 @@ const PAUSE: Duration = Duration::from_millis(200);
 
 const ASK_FOR_RUN: Question = Question("ask for a run", "the sender");
 
-#[derive(Clone, Debug)]
-pub struct ReceiveOptions {
-    pub out: PathBuf,
-    pub link: LinkConfig,
-    pub gyre: String,
-    /// Topics to receive of those that are sent; empty: all.
-    pub topics: Vec<String>,
-}
-
 pub struct RemoteRun {
     session: Session,
     offer: RunOffer,
 }
 
 /// Waits for the sender. `None` on a request to stop.
-pub fn ask(link: &LinkConfig, signals: &Signals) -> Result<Option<RemoteRun>, LinkError> {
-    let Some(session) = session::open(link, || Ok(signals.sleep(PAUSE)?))? else {
+pub fn ask(link: &LinkConfig, signals: &Signals) -> Result<Option<RemoteRun>, StageError> {
+    let Some(session) = session::open(link, || signals.sleep(PAUSE))? else {
         return Ok(None);
     };
     loop {
@@ -65,11 +56,11 @@ pub fn ask(link: &LinkConfig, signals: &Signals) -> Result<Option<RemoteRun>, Li
     }
 }
 
-fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
+fn require_same(offered: &OfferedTopic) -> Result<(), StageError> {
     let ours = topic(&offered.name).map(|topic| topic.header.name);
     match ours == Some(&*offered.version) {
         true => Ok(()),
-        false => Err(LinkError::other_version(ASK_FOR_RUN.1)),
+        false => Err(other_version(ASK_FOR_RUN.1)),
     }
 }
 
@@ -90,34 +81,38 @@ impl RemoteRun {
     }
 }
 
+/// Receives these topics of those that are sent; without any all. `gyre` is the program.
 pub fn receive(
-    options: &ReceiveOptions,
+    out: &Path,
+    link: &LinkConfig,
+    topics: &[String],
+    gyre: String,
     remote: RemoteRun,
     signals: &Signals,
-) -> Result<Received, LinkError> {
-    let manifest = remote.manifest(&options.out);
-    let journal = Journal::open(&journal::path(&manifest.out))?;
-    let next_pose = next_pose(&journal, &remote.offer, &options.out)?;
-    let guardian = [options.gyre.clone(), "guard".to_owned()];
-    let mut rig = Rig::new(manifest, &remote.offer.configuration, &guardian, signals)?;
-    rig.create_services()?;
+) -> Result<Received, StageError> {
+    let manifest = remote.manifest(out);
+    let journal = Journal::open(&journal::path(&manifest.out)).map_err(StageError::input)?;
+    let next_pose = next_pose(&journal, &remote.offer, out)?;
+    let guardian = [gyre, "guard".to_owned()];
+    let rig = Rig::new(manifest, &remote.offer.configuration, &guardian, signals);
+    let mut rig = rig.map_err(StageError::input)?;
+    rig.create_services().map_err(StageError::input)?;
     let _log = launch::start_log(rig.manifest(), NAME)?;
     let RemoteRun { session, offer } = remote;
     let mut mirror = Mirror {
         session: session.clone(),
-        link: options.link.name.clone(),
-        receiver: receiver(&options.out, &session)?,
+        link: link.name.clone(),
+        receiver: receiver(out, &session)?,
         topics: Vec::new(),
         journal,
         next_pose,
-        answers: None,
         offer,
         waker: Waker::new()?,
         signals,
         rig,
     };
     for offered in mirror.offer.topics.clone() {
-        if options.topics.is_empty() || options.topics.contains(&offered.name) {
+        if topics.is_empty() || topics.contains(&offered.name) {
             mirror.topics.push(mirror.open(&offered)?);
         }
     }
@@ -132,27 +127,29 @@ pub fn receive(
 
 /// Returns the identity of this receiver, the same after a restart: the name of the first session
 /// that has written to the folder.
-fn receiver(out: &Path, session: &Session) -> Result<String, LinkError> {
+fn receiver(out: &Path, session: &Session) -> Result<String, StageError> {
     let path = out.join("journal/receiver");
     match fs::read_to_string(&path) {
         Ok(name) if !name.is_empty() && name.chars().all(|c| c.is_ascii_hexdigit()) => Ok(name),
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(LinkError::file(&path, &error)),
+        Err(source) if source.kind() != ErrorKind::NotFound => {
+            Err(StageError::File { path, source })
+        }
         _ => {
             let name = session.zid().to_string();
-            fs::write(&path, &name).map_err(|error| LinkError::file(&path, &error))?;
+            fs::write(&path, &name).map_err(|source| StageError::File { path, source })?;
             Ok(name)
         }
     }
 }
 
-fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, LinkError> {
-    let (last, ended) = journal.last(1)?;
+fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, StageError> {
+    let (last, ended) = journal.last(1).map_err(StageError::input)?;
     let Some(last) = last.first() else {
         return Ok(0);
     };
     match began_ns(out)? == offer.began_ns && !ended {
         true => Ok(last.item.seq.saturating_add(1)),
-        false => Err(LinkError::Refused(format!(
+        false => Err(StageError::Input(format!(
             "{} has the poses of a different drive: choose another folder",
             out.display()
         ))),

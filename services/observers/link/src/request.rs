@@ -2,12 +2,15 @@
 
 use std::time::Duration;
 
+use gyre_stage::StageError;
 use serde::{Serialize, de::DeserializeOwned};
 use zenoh::{
-    Session, Wait, bytes::ZBytes, handlers::FifoChannelHandler, query::Queryable, query::Reply,
+    Session, Wait,
+    bytes::ZBytes,
+    query::{Queryable, Reply},
 };
 
-use crate::LinkError;
+use crate::error::{failed, other_version};
 
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
@@ -16,41 +19,23 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 #[derive(Clone, Copy)]
 pub(crate) struct Question(pub &'static str, pub &'static str);
 
-pub(crate) type Answers = FifoChannelHandler<Reply>;
-
 impl Question {
-    pub fn send(
-        self,
-        session: &Session,
-        key: String,
-        payload: impl Into<ZBytes>,
-    ) -> Result<Answers, LinkError> {
-        let asked = session.get(key).payload(payload).timeout(ANSWER_TIMEOUT);
-        asked.wait().map_err(|e| LinkError::zenoh(self.0, &e))
-    }
-
-    /// Sends the question and waits for the answer; returns `None` without an answer.
+    /// Sends the question and waits for the answer; returns `None` without an answer, or for an
+    /// error of the network layer.
     pub fn ask<A: DeserializeOwned>(
         self,
         session: &Session,
         key: String,
         payload: impl Into<ZBytes>,
-    ) -> Result<Option<A>, LinkError> {
-        match self.send(session, key, payload)?.recv() {
-            Ok(reply) => self.parse(reply),
-            Err(_) => Ok(None),
-        }
-    }
-
-    /// Parses an answer; `None` if it is an error of the network layer.
-    pub fn parse<A: DeserializeOwned>(self, reply: Reply) -> Result<Option<A>, LinkError> {
-        let Ok(sample) = reply.into_result() else {
+    ) -> Result<Option<A>, StageError> {
+        let asked = session.get(key).payload(payload).timeout(ANSWER_TIMEOUT);
+        let answers = asked.wait().map_err(|e| failed(self.0, &e))?;
+        let answer = answers.recv().ok().map(Reply::into_result);
+        let Some(Ok(sample)) = answer else {
             return Ok(None);
         };
         let answer = serde_json::from_slice(&sample.payload().to_bytes());
-        answer
-            .map(Some)
-            .map_err(|_| LinkError::other_version(self.1))
+        answer.map(Some).map_err(|_| other_version(self.1))
     }
 }
 
@@ -60,7 +45,7 @@ pub(crate) fn answer<A: Serialize>(
     key: String,
     action: &str,
     answer: impl Fn() -> A + Send + Sync + 'static,
-) -> Result<Queryable<()>, LinkError> {
+) -> Result<Queryable<()>, StageError> {
     let reply_key = key.clone();
     session
         .declare_queryable(key)
@@ -70,5 +55,5 @@ pub(crate) fn answer<A: Serialize>(
             }
         })
         .wait()
-        .map_err(|e| LinkError::zenoh(action, &e))
+        .map_err(|e| failed(action, &e))
 }

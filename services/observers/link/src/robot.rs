@@ -16,7 +16,6 @@ use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
-    LinkError,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
@@ -30,10 +29,10 @@ use crate::{
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
-    let journal = Journal::open(&journal::path(&launch.manifest.out)).map_err(LinkError::from)?;
+    let journal = Journal::open(&journal::path(&launch.manifest.out)).map_err(StageError::input)?;
     let mut stages = LastStages::open(launch, config.returns_motions())?;
     let waker = Waker::new()?;
-    let sleep = || Ok(stages.sleep(waker.descriptor())?);
+    let sleep = || stages.sleep(waker.descriptor());
     let Some(session) = session::open(&config, sleep)? else {
         return Ok(stages.counters());
     };
@@ -41,7 +40,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         launch,
         stages,
         journal,
-        poses: VecDeque::new(),
+        next_pose: 0,
         sent: VecDeque::new(),
         session,
         waker,
@@ -58,8 +57,8 @@ struct Robot<'a> {
     config: LinkConfig,
     stages: LastStages<'a>,
     journal: Journal,
-    /// The newest poses, to be published again.
-    poses: VecDeque<PoseHeader>,
+    /// The number of the first pose that is not in the journal.
+    next_pose: u64,
     /// The newest items of the cut, with their times on this machine.
     sent: VecDeque<Item>,
     session: Session,
@@ -72,7 +71,7 @@ struct SentTopic {
 }
 
 impl Robot<'_> {
-    fn work(&mut self) -> Result<(), LinkError> {
+    fn work(&mut self) -> Result<(), StageError> {
         let bytes = self.launch.manifest.limits.scan_bytes;
         let key = handshake::scan_size_key(&self.config);
         let _scan_size = request::answer(
@@ -81,11 +80,16 @@ impl Robot<'_> {
             "report the size of the scans",
             move || bytes,
         )?;
-        let (poses, ended) = self.journal.last(self.stages.history().max(1))?;
-        self.poses = poses.into();
+        let (poses, ended) = self.last_poses()?;
+        let newest = poses.last().map(|pose| pose.item);
         if ended {
-            return self.repeat_end();
+            // The run has ended before, and only its results are missing.
+            self.stages.republish(&poses)?;
+            self.stages.end(newest.unwrap_or_default())?;
+            while !self.sleep()? {}
+            return Ok(());
         }
+        self.next_pose = newest.map_or(0, |item| item.seq.saturating_add(1));
         let Some(received) = self.begin()? else {
             return Ok(());
         };
@@ -93,29 +97,20 @@ impl Robot<'_> {
         if !self.catch_up(&poses, received)? {
             return Ok(());
         }
-        self.stages.republish(self.poses.make_contiguous())?;
+        self.stages.republish(&self.last_poses()?.0)?;
         self.stages.has_handed_over(0)?;
         self.relay(&poses)
     }
 
-    /// Publishes the end again: the run has ended before, and only its results are missing.
-    fn repeat_end(&mut self) -> Result<(), LinkError> {
-        self.stages.republish(self.poses.make_contiguous())?;
-        let newest = self.poses.back().map(|pose| pose.item);
-        self.stages.end(newest.unwrap_or_default())?;
-        while !self.sleep()? {}
-        Ok(())
-    }
-
-    /// Returns the number of the first pose that is not in the journal.
-    fn next_pose(&self) -> u64 {
-        let newest = self.poses.back();
-        newest.map_or(0, |pose| pose.item.seq.saturating_add(1))
+    /// Returns the newest poses of the journal, to be published again, and whether it has ended.
+    fn last_poses(&self) -> Result<(Vec<PoseHeader>, bool), StageError> {
+        let poses = self.journal.last(self.stages.history().max(1));
+        poses.map_err(StageError::input)
     }
 
     /// Asks the base where to continue until it answers; returns the number of items that have
     /// poses or will. `None` on a request to stop.
-    fn begin(&mut self) -> Result<Option<u64>, LinkError> {
+    fn begin(&mut self) -> Result<Option<u64>, StageError> {
         let topics = self.topics();
         let agreement = Agreement::of(&self.launch.manifest, &self.config, &topics);
         let mut logged = String::new();
@@ -125,7 +120,7 @@ impl Robot<'_> {
                     let received = newest.map_or(0, |newest| newest + 1);
                     return self.check_start(received).map(|()| Some(received));
                 }
-                Some(StartAnswer::Refused(why)) => return Err(LinkError::Refused(why)),
+                Some(StartAnswer::Refused(why)) => return Err(StageError::Input(why)),
                 Some(StartAnswer::Wait(why)) => why,
                 None => "the base does not answer yet".to_owned(),
             };
@@ -139,16 +134,16 @@ impl Robot<'_> {
         }
     }
 
-    fn check_start(&self, received: u64) -> Result<(), LinkError> {
-        let (poses, base) = (self.next_pose(), received);
+    fn check_start(&self, received: u64) -> Result<(), StageError> {
+        let (poses, base) = (self.next_pose, received);
         let window = self.launch.manifest.window.scans as u64;
         match self.config.cut {
-            _ if base < poses => Err(LinkError::Refused(format!(
+            _ if base < poses => Err(StageError::Input(format!(
                 "this run has {poses} poses, but the base begins at {base}: begin both anew with --fresh, or go on with the base's --out of this run"
             ))),
             // The local map is here, and cannot be restored from poses.
             PlayedFrom::Refined if base > poses.saturating_add(window) => {
-                Err(LinkError::Refused(format!(
+                Err(StageError::Input(format!(
                     "the base has {base} poses and this run {poses}, and the local map of the refinement, which is here, cannot be made up: begin both anew with --fresh"
                 )))
             }
@@ -157,13 +152,13 @@ impl Robot<'_> {
     }
 
     /// Journals the poses of all items of an earlier start; false on a request to stop.
-    fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, LinkError> {
-        while self.next_pose() < received {
+    fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, StageError> {
+        while self.next_pose < received {
             self.waker.clear();
             while let Some(bytes) = poses.next() {
                 self.journal(&bytes)?;
             }
-            if self.next_pose() < received && self.sleep()? {
+            if self.next_pose < received && self.sleep()? {
                 return Ok(false);
             }
         }
@@ -171,7 +166,7 @@ impl Robot<'_> {
     }
 
     /// Sends the messages of the stages here, and publishes those that come back, until SIGTERM.
-    fn relay(&mut self, poses: &Fetcher) -> Result<(), LinkError> {
+    fn relay(&mut self, poses: &Fetcher) -> Result<(), StageError> {
         let topics = self.topics();
         self.stages.read(&topics)?;
         let prefix = handshake::prefix(&self.config, Side::Robot);
@@ -182,7 +177,7 @@ impl Robot<'_> {
             let offer = server.offer(topic, buffer.clone())?;
             Ok(SentTopic { buffer, offer })
         });
-        let sent = sent.collect::<Result<Vec<_>, LinkError>>()?;
+        let sent = sent.collect::<Result<Vec<_>, StageError>>()?;
         let returns_motions = self.config.returns_motions();
         let motions = returns_motions.then(|| self.fetch(Motion::TOPIC));
         let (mut end, mut has_ended) = (None, false);
@@ -201,8 +196,8 @@ impl Robot<'_> {
                     self.stages.publish_pose(pose)?;
                 }
             }
-            connection.update(poses.is_connected(), self.next_pose());
-            if let Some(end) = end.filter(|end| !has_ended && self.next_pose() == end.seq) {
+            connection.update(poses.is_connected(), self.next_pose);
+            if let Some(end) = end.filter(|end| !has_ended && self.next_pose == end.seq) {
                 has_ended = self.end(&end, &sent, poses)?;
             }
             if self.sleep()? {
@@ -221,7 +216,7 @@ impl Robot<'_> {
         sent: &SentTopic,
         topics: usize,
         depth: usize,
-    ) -> Result<Option<Item>, LinkError> {
+    ) -> Result<Option<Item>, StageError> {
         let mut end = None;
         while let Some(message) = self.stages.receive(place)? {
             let item = message.item().unwrap_or_default();
@@ -239,9 +234,9 @@ impl Robot<'_> {
     }
 
     /// Journals a pose; `None` if it was there already.
-    fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, LinkError> {
+    fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, StageError> {
         let mut pose = self.checked::<Pose, PoseHeader>(bytes)?;
-        let (expected, got) = (self.next_pose(), pose.item.seq);
+        let (expected, got) = (self.next_pose, pose.item.seq);
         if got < expected || pose.item.is(flag::END) {
             return Ok(None);
         }
@@ -251,14 +246,11 @@ impl Robot<'_> {
                 topic,
                 expected,
                 got,
-            }
-            .into());
+            });
         }
         pose.item = self.timed(pose.item);
-        self.journal.append(&pose)?;
-        self.poses.push_back(pose);
-        let history = self.stages.history().max(1);
-        self.poses.drain(..self.poses.len().saturating_sub(history));
+        self.journal.append(&pose).map_err(StageError::input)?;
+        self.next_pose = got.saturating_add(1);
         Ok(Some(pose))
     }
 
@@ -285,18 +277,21 @@ impl Robot<'_> {
     }
 
     /// Ends this side once the base requests what follows the end; false before.
-    fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, LinkError> {
+    fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, StageError> {
         // The base ends when it knows that all poses are here, and that this side knows of its end.
-        poses.confirm(self.next_pose());
+        poses.confirm(self.next_pose);
         let has_end = |sent: &SentTopic| sent.offer.answered() > end.seq;
         if !sent.iter().all(has_end) {
             return Ok(false);
         }
         let flags = flag::END;
-        self.journal.append(&PoseHeader {
+        let end_record = PoseHeader {
             item: Item { flags, ..*end },
             ..PoseHeader::default()
-        })?;
+        };
+        self.journal
+            .append(&end_record)
+            .map_err(StageError::input)?;
         self.stages.end(*end)?;
         Ok(true)
     }
@@ -310,7 +305,7 @@ impl Robot<'_> {
     fn fetch(&self, topic: &str) -> Fetcher {
         let request = Request {
             key: format!("{}/{topic}", handshake::prefix(&self.config, Side::Base)),
-            from: self.next_pose(),
+            from: self.next_pose,
             generation: None,
             receiver: self.session.zid().to_string(),
             priority: Priority::InteractiveHigh,
@@ -322,7 +317,7 @@ impl Robot<'_> {
     fn checked<M: gyre_messages::Message<Header = H>, H: Pod>(
         &self,
         bytes: &[u8],
-    ) -> Result<H, LinkError> {
+    ) -> Result<H, StageError> {
         let malformed = |reason: String| StageError::Malformed {
             topic: M::TOPIC,
             sender: "the base",
@@ -336,7 +331,7 @@ impl Robot<'_> {
         Ok(header)
     }
 
-    fn sleep(&mut self) -> Result<bool, LinkError> {
-        Ok(self.stages.sleep(self.waker.descriptor())?)
+    fn sleep(&mut self) -> Result<bool, StageError> {
+        self.stages.sleep(self.waker.descriptor())
     }
 }

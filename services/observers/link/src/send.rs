@@ -9,14 +9,14 @@
 use std::{
     collections::BTreeMap,
     fmt, fs,
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use gyre_journal::{self as journal, loops::LoggedLoops};
 use gyre_messages::{
-    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
+    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Window, topic,
 };
 use gyre_run::LinkConfig;
 use gyre_stage::{
@@ -28,7 +28,6 @@ use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait, query::Queryable};
 
 use crate::{
-    LinkError,
     network::check,
     replay_buffer::{LogBuffer, MemoryBuffer, MotionBuffer, ReplayBuffer},
     request,
@@ -45,16 +44,6 @@ const MAX_BYTES: usize = 64 << 20;
 const RECONNECT_TIME: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would arrive later.
 const MAX_SCANS: usize = 2;
-
-#[derive(Clone, Debug)]
-pub struct SendOptions {
-    pub out: PathBuf,
-    pub link: LinkConfig,
-    /// The topics; empty: all that the run has but scans and rasters.
-    pub topics: Vec<String>,
-    /// Time to wait, after the end of the run, for receivers that have not everything yet.
-    pub linger: Duration,
-}
 
 /// The messages and bytes that were sent to all receivers together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -95,7 +84,6 @@ pub(crate) struct RunOffer {
 pub(crate) struct OfferedTopic {
     pub name: String,
     pub version: String,
-    pub is_lossless: bool,
 }
 
 pub(crate) fn prefix(name: &str, sender: &str) -> String {
@@ -107,22 +95,32 @@ pub(crate) fn offer_key(name: &str) -> String {
 }
 
 /// Returns the time of the first pose in a folder, ns since 1970.
-pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, LinkError> {
-    let mut records = journal::records(&journal::path(out))?.into_iter().flatten();
-    Ok(records.next().transpose()?.map(|pose| pose.item.stamp_ns))
+pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, StageError> {
+    let records = journal::records(&journal::path(out)).map_err(StageError::input)?;
+    let first = records.into_iter().flatten().next().transpose();
+    Ok(first
+        .map_err(StageError::input)?
+        .map(|pose| pose.item.stamp_ns))
 }
 
-pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
-    check(&options.link)?;
-    let run = ObservedRun::writing_to(&options.out)?;
+/// Sends these topics (without any: all that the run has but scans and rasters), and waits for
+/// `linger` after the end of the run for receivers that have not everything yet.
+pub fn send(
+    out: &Path,
+    link: &LinkConfig,
+    topics: &[String],
+    linger: Duration,
+) -> Result<Sent, StageError> {
+    check(link)?;
+    let run = ObservedRun::writing_to(out)?;
     let _log = launch::start_log(run.manifest(), NAME)?;
     let signals = Signals::install()?;
-    let pause = || Ok(signals.sleep(MAX_WAIT)?);
-    let Some(session) = session::open(&options.link, pause)? else {
+    let pause = || signals.sleep(MAX_WAIT);
+    let Some(session) = session::open(link, pause)? else {
         return Ok(Sent::default());
     };
-    let sending = Sending::begin(&run, options, &session)?;
-    let sent = sending.run(&signals, options.linger);
+    let sending = Sending::begin(&run, &link.name, topics, &session)?;
+    let sent = sending.run(&signals, linger);
     let _ = session.close().wait();
     sent
 }
@@ -135,7 +133,6 @@ struct Sending<'run> {
 }
 
 struct SentTopic<'run> {
-    name: &'static str,
     observer: TopicObserver<'run>,
     buffer: Arc<dyn ReplayBuffer>,
     offer: Arc<Offer>,
@@ -144,34 +141,34 @@ struct SentTopic<'run> {
 impl<'run> Sending<'run> {
     fn begin(
         run: &'run ObservedRun,
-        options: &SendOptions,
+        link: &str,
+        named: &[String],
         session: &Session,
-    ) -> Result<Self, LinkError> {
+    ) -> Result<Self, StageError> {
         let manifest = run.manifest();
-        let prefix = prefix(&options.link.name, &session.zid().to_string());
+        let prefix = prefix(link, &session.zid().to_string());
         let mut server = Server::new(session, &prefix, None);
-        let logs = Logs::of(manifest)?;
-        let names = topics(&options.topics, manifest)?;
+        let poses = Arc::new(LogBuffer::of_poses(&manifest.out));
+        let names = topics(named, manifest)?;
         let topics = names.iter().copied().map(|name| {
             let observer = run.observe_topic(name)?.ok_or_else(|| no_topic(name))?;
-            let buffer = logs.buffer(name, manifest);
+            let buffer = buffer(name, manifest, &poses)?;
             Ok(SentTopic {
-                name,
                 observer,
                 offer: server.offer(name, buffer.clone())?,
                 buffer,
             })
         });
-        let topics = topics.collect::<Result<Vec<_>, LinkError>>()?;
+        let topics = topics.collect::<Result<Vec<_>, StageError>>()?;
         Ok(Self {
             run,
             topics,
-            _offer: offer(session, options, manifest, &names)?,
+            _offer: offer(session, link, manifest, &names)?,
             _server: server,
         })
     }
 
-    fn run(mut self, signals: &Signals, linger: Duration) -> Result<Sent, LinkError> {
+    fn run(mut self, signals: &Signals, linger: Duration) -> Result<Sent, StageError> {
         let mut ended: Option<Instant> = None;
         loop {
             // Before the queues are read: messages from before the end are still in them.
@@ -211,7 +208,7 @@ impl<'run> Sending<'run> {
 
     fn sent(&self) -> Sent {
         let topics = self.topics.iter();
-        let topics = topics.map(|topic| (topic.name.to_owned(), topic.offer.sent()));
+        let topics = topics.map(|topic| (topic.observer.topic().to_owned(), topic.offer.sent()));
         Sent {
             topics: topics.collect(),
             is_incomplete: !self.is_complete(),
@@ -233,50 +230,41 @@ impl SentTopic<'_> {
     }
 }
 
-struct Logs {
-    poses: Arc<LogBuffer>,
-    /// `None` in a run without SLAM.
-    loops: Option<Arc<LogBuffer>>,
-}
-
-impl Logs {
-    fn of(manifest: &Manifest) -> Result<Self, LinkError> {
-        let open = || LoggedLoops::open(&manifest.out).map_err(StageError::from);
-        let loops = manifest.window.slam.then(open).transpose()?;
-        Ok(Self {
-            poses: Arc::new(LogBuffer::of_poses(&manifest.out)),
-            loops: loops.map(|loops| Arc::new(LogBuffer::of_loops(loops))),
-        })
-    }
-
-    fn buffer(&self, name: &str, manifest: &Manifest) -> Arc<dyn ReplayBuffer> {
-        let composed = match manifest.refines {
-            true => Refined::TOPIC,
-            false => Motion::TOPIC,
-        };
-        match (name, &self.loops) {
-            (Pose::TOPIC, _) => self.poses.clone(),
-            (Loop::TOPIC, Some(loops)) => loops.clone(),
-            _ if name == composed => Arc::new(MotionBuffer(self.poses.clone())),
-            _ if is_lossless(name) => Arc::new(MemoryBuffer::bounded(usize::MAX, MAX_BYTES)),
-            _ => Arc::new(MemoryBuffer::of(MAX_SCANS)),
+/// Returns the buffer of a topic. The poses are those of the run.
+fn buffer(
+    name: &str,
+    manifest: &Manifest,
+    poses: &Arc<LogBuffer>,
+) -> Result<Arc<dyn ReplayBuffer>, StageError> {
+    let composed = match manifest.refines {
+        true => Refined::TOPIC,
+        false => Motion::TOPIC,
+    };
+    let buffer: Arc<dyn ReplayBuffer> = match name {
+        Pose::TOPIC => poses.clone(),
+        Loop::TOPIC => {
+            let loops = LoggedLoops::open(&manifest.out)?;
+            Arc::new(LogBuffer::of_loops(loops))
         }
-    }
+        _ if name == composed => Arc::new(MotionBuffer(poses.clone())),
+        _ if is_lossless(name) => Arc::new(MemoryBuffer::bounded(usize::MAX, MAX_BYTES)),
+        _ => Arc::new(MemoryBuffer::of(MAX_SCANS)),
+    };
+    Ok(buffer)
 }
 
 /// Returns whether no message of a topic may be missed: all but the large ones with payloads.
-fn is_lossless(topic: &str) -> bool {
+pub(crate) fn is_lossless(topic: &str) -> bool {
     topic != Scan::TOPIC && topic != Masked::TOPIC
 }
 
 /// Returns the topics to send; poses are among them, since the motions come with them.
-fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, LinkError> {
-    let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
-        Some(Sender::Follower(follower)) => follower.is_in(&manifest.window),
-        _ => *name != Refined::TOPIC || manifest.refines,
-    };
+fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, StageError> {
     let named: Vec<&str> = match named.is_empty() {
-        true => DEFAULT.into_iter().filter(has).collect(),
+        true => DEFAULT
+            .into_iter()
+            .filter(|name| manifest.has_topic(name))
+            .collect(),
         false => named.iter().map(String::as_str).collect(),
     };
     let mut topics = Vec::new();
@@ -289,23 +277,22 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, Li
     Ok(topics)
 }
 
-fn no_topic(name: &str) -> LinkError {
-    LinkError::Refused(format!(
+fn no_topic(name: &str) -> StageError {
+    StageError::Input(format!(
         "there is no topic `{name}`: there are scan, masked, rotation, motion, refined, pose, loop, correction and fix"
     ))
 }
 
 fn offer(
     session: &Session,
-    options: &SendOptions,
+    link: &str,
     manifest: &Manifest,
     names: &[&'static str],
-) -> Result<Queryable<()>, LinkError> {
+) -> Result<Queryable<()>, StageError> {
     let path = manifest.root.join("config.toml");
     let offered = |name: &&'static str| OfferedTopic {
         name: (*name).to_owned(),
         version: topic(name).map_or("", |topic| topic.header.name).to_owned(),
-        is_lossless: is_lossless(name),
     };
     let run = RunOffer {
         window: manifest.window,
@@ -313,12 +300,13 @@ fn offer(
         live: manifest.live,
         refines: manifest.refines,
         rate: manifest.rate,
-        configuration: fs::read_to_string(&path).map_err(|e| LinkError::file(&path, &e))?,
+        configuration: fs::read_to_string(&path)
+            .map_err(|source| StageError::File { path, source })?,
         sender: session.zid().to_string(),
         began_ns: None,
         topics: names.iter().map(offered).collect(),
     };
-    let key = offer_key(&options.link.name);
+    let key = offer_key(link);
     let out = manifest.out.clone();
     request::answer(session, key, "offer a run", move || RunOffer {
         began_ns: began_ns(&out).ok().flatten(),

@@ -10,13 +10,14 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_stage::StageError;
 use zenoh::{
     Session, Wait,
     query::{Query, Queryable},
 };
 
 use crate::{
-    LinkError,
+    error::failed,
     replay_buffer::{Next, Place, ReplayBuffer},
     waker::Waker,
 };
@@ -28,8 +29,6 @@ pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
-/// The most requests of a topic that are answered at once. A receiver has one of each topic.
-const MAX_REQUESTS: usize = 64;
 
 /// The answer that means that no message follows.
 pub(crate) const ENDED: &str = "ended";
@@ -54,13 +53,10 @@ pub(crate) struct Server {
 pub(crate) struct Offer {
     buffer: Arc<dyn ReplayBuffer>,
     key: String,
-    /// The highest number that was requested: all before it has arrived.
-    asked: AtomicU64,
-    /// As above, for the requests that have been answered.
+    /// The highest number of the requests that have been answered: all before it has arrived.
     answered: AtomicU64,
     /// The newest request of each receiver, which replaces those before.
     receivers: Mutex<BTreeMap<String, ReceiverState>>,
-    running: AtomicU64,
     messages: AtomicU64,
     bytes: AtomicU64,
     waker: Option<Waker>,
@@ -87,14 +83,12 @@ impl Server {
         &mut self,
         topic: &str,
         buffer: Arc<dyn ReplayBuffer>,
-    ) -> Result<Arc<Offer>, LinkError> {
+    ) -> Result<Arc<Offer>, StageError> {
         let offer = Arc::new(Offer {
             buffer,
             key: format!("{}/{topic}", self.prefix),
-            asked: AtomicU64::new(0),
             answered: AtomicU64::new(0),
             receivers: Mutex::default(),
-            running: AtomicU64::new(0),
             messages: AtomicU64::new(0),
             bytes: AtomicU64::new(0),
             waker: self.waker.clone(),
@@ -106,7 +100,7 @@ impl Server {
             .declare_queryable(&offer.key)
             .callback(move |query| answering.clone().accept(query))
             .wait()
-            .map_err(|e| LinkError::zenoh(&format!("offer {topic}"), &e))?;
+            .map_err(|e| failed(&format!("offer {topic}"), &e))?;
         self.queryables.push(queryable);
         Ok(offer)
     }
@@ -119,11 +113,8 @@ impl Drop for Server {
 }
 
 impl Offer {
-    pub fn asked(&self) -> u64 {
-        self.asked.load(Ordering::Relaxed)
-    }
-
-    /// Returns the same, as far as the receiver can know that it is known here.
+    /// Returns the number before which all has arrived, as far as the receiver can know that it is
+    /// known here.
     pub fn answered(&self) -> u64 {
         self.answered.load(Ordering::Relaxed)
     }
@@ -150,37 +141,26 @@ impl Offer {
     /// Answers a request in a thread of its own, since sending waits while the network is slow.
     fn accept(self: Arc<Self>, query: Query) {
         let parameters = query.parameters();
-        let from = parameters.get(FROM).and_then(|from| from.parse().ok());
         let receiver = parameters.get(RECEIVER).unwrap_or_default().to_owned();
         if parameters.get(DONE).is_some() {
             self.replace(&receiver, true);
             let _ = query.reply_err(ENDED).wait();
             return;
         }
-        let running = self.running.fetch_add(1, Ordering::Relaxed);
-        let Some(from) = from.filter(|_| running < MAX_REQUESTS as u64) else {
-            self.running.fetch_sub(1, Ordering::Relaxed);
+        let Some(from) = parameters.get(FROM).and_then(|from| from.parse().ok()) else {
             return;
         };
         let place = Place {
             seq: from,
             generation: parameters.get(GENERATION).and_then(|it| it.parse().ok()),
         };
-        self.asked.fetch_max(from, Ordering::Relaxed);
-        if let Some(waker) = &self.waker {
-            waker.wake();
-        }
         let request = self.replace(&receiver, false);
-        let answering = self.clone();
-        let spawned = thread::Builder::new().spawn(move || {
-            if let Err(error) = answering.answer(&query, place, &receiver, request) {
-                tracing::debug!("{}: {error}", answering.key);
+        // A receiver that is not answered asks again.
+        let _ = thread::Builder::new().spawn(move || {
+            if let Err(error) = self.answer(&query, place, &receiver, request) {
+                tracing::debug!("{}: {error}", self.key);
             }
-            answering.running.fetch_sub(1, Ordering::Relaxed);
         });
-        if spawned.is_err() {
-            self.running.fetch_sub(1, Ordering::Relaxed);
-        }
     }
 
     fn answer(
@@ -189,7 +169,7 @@ impl Offer {
         mut place: Place,
         receiver: &str,
         request: u64,
-    ) -> Result<(), LinkError> {
+    ) -> Result<(), StageError> {
         // The receiver learns at once that this end is there.
         self.reply(query, &[])?;
         self.answered.fetch_max(place.seq, Ordering::Relaxed);
@@ -215,16 +195,16 @@ impl Offer {
                 Next::Nothing => {}
                 Next::Ended => {
                     let replied = query.reply_err(ENDED).wait();
-                    return replied.map_err(|e| LinkError::zenoh("send", &e));
+                    return replied.map_err(|e| failed("send", &e));
                 }
             }
         }
         Ok(())
     }
 
-    fn reply(&self, query: &Query, bytes: &[u8]) -> Result<(), LinkError> {
+    fn reply(&self, query: &Query, bytes: &[u8]) -> Result<(), StageError> {
         let reply = query.reply(&self.key, bytes).express(true);
-        reply.wait().map_err(|e| LinkError::zenoh("send", &e))
+        reply.wait().map_err(|e| failed("send", &e))
     }
 
     /// Notes a request of a receiver, which replaces those before; returns its number.

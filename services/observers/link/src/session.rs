@@ -7,10 +7,11 @@ use std::{
 };
 
 use gyre_run::LinkConfig;
+use gyre_stage::StageError;
 use serde_json::{Value, json};
 use zenoh::{Config, Session, Wait};
 
-use crate::{LinkError, ONE_THREAD, network::check};
+use crate::{error::failed, network::check};
 
 /// Time without a sign of life after which a connection is given up, ms. Messages wait meanwhile.
 const LEASE_MS: u64 = 3000;
@@ -23,38 +24,26 @@ const MAX_BLOCKED_US: u64 = 900_000_000;
 /// `None` after one.
 pub(crate) fn open(
     link: &LinkConfig,
-    mut pause: impl FnMut() -> Result<bool, LinkError>,
-) -> Result<Option<Session>, LinkError> {
+    mut pause: impl FnMut() -> Result<bool, StageError>,
+) -> Result<Option<Session>, StageError> {
     check(link)?;
-    require_one_thread(link)?;
     let config = Config::from_json5(&settings(link).to_string())
-        .map_err(|e| LinkError::zenoh("use the settings of the link", &e))?;
+        .map_err(|e| failed("use the settings of the link", &e))?;
     let (sender, opened) = channel();
     // The call does not return before it is connected, whatever signal arrives.
     thread::spawn(move || sender.send(zenoh::open(config).wait()));
     loop {
         match opened.try_recv() {
             Ok(session) => {
-                let failed = |e| LinkError::zenoh("open the link", &e);
+                let failed = |e| failed("open the link", &e);
                 return session.map(Some).map_err(failed);
             }
             Err(TryRecvError::Disconnected) => {
-                return Err(LinkError::zenoh("open the link", &"it has failed"));
+                return Err(failed("open the link", &"it has failed"));
             }
             Err(TryRecvError::Empty) if pause()? => return Ok(None),
             Err(TryRecvError::Empty) => {}
         }
-    }
-}
-
-fn require_one_thread(link: &LinkConfig) -> Result<(), LinkError> {
-    let (name, value) = ONE_THREAD;
-    let is_set = std::env::var_os(name).is_some_and(|set| set == value);
-    match is_set || link.certificate.as_os_str().is_empty() {
-        true => Ok(()),
-        false => Err(LinkError::Refused(format!(
-            "TLS needs {name}='{value}' in the environment, which `gyre run` and `gyre link` set"
-        ))),
     }
 }
 

@@ -138,12 +138,12 @@ fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
     let mut server = Server::new(&here, "gyre/test", None);
     let offer = server.offer("topic", buffer.clone()).unwrap();
     assert_eq!(take(&fetcher, 2), [3, 4]);
-    assert!(fetcher.is_connected() && offer.asked() == 3);
+    assert!(fetcher.is_connected() && offer.answered() == 3);
     add(&buffer, 5);
     assert_eq!(take(&fetcher, 1), [5]);
     fetcher.confirm(6);
     until("the sender knows that all have arrived", || {
-        offer.asked() == 6
+        offer.answered() == 6
     });
     until("the receiver knows that the sender knows", || {
         fetcher.is_confirmed(6)

@@ -1,44 +1,40 @@
 //! Wakes a loop that sleeps on descriptors from a thread of the network.
 
 use std::{
-    io::{Read, Write},
-    os::{
-        fd::{AsFd, BorrowedFd},
-        unix::net::UnixStream,
-    },
+    os::fd::{AsFd, BorrowedFd, OwnedFd},
     sync::Arc,
 };
 
-use crate::LinkError;
+use gyre_stage::StageError;
+use rustix::{
+    event::{EventfdFlags, eventfd},
+    io::{read, write},
+};
 
-/// Two connected sockets: a byte in one makes the other readable. Clones share them.
+use crate::error::failed;
+
+/// A descriptor that is readable from a call of [`wake`](Self::wake) to the next of
+/// [`clear`](Self::clear). Clones share it.
 #[derive(Clone, Debug)]
-pub(crate) struct Waker(Arc<[UnixStream; 2]>);
+pub(crate) struct Waker(Arc<OwnedFd>);
 
 impl Waker {
-    pub fn new() -> Result<Self, LinkError> {
-        let open = || {
-            let (sleeping, waking) = UnixStream::pair()?;
-            sleeping.set_nonblocking(true)?;
-            waking.set_nonblocking(true)?;
-            Ok([sleeping, waking])
-        };
-        let sockets = open().map_err(|e: std::io::Error| LinkError::zenoh("make a socket", &e))?;
-        Ok(Self(Arc::new(sockets)))
+    pub fn new() -> Result<Self, StageError> {
+        let event = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK);
+        let event = event.map_err(|e| failed("make an event", &e))?;
+        Ok(Self(Arc::new(event)))
     }
 
     pub fn descriptor(&self) -> BorrowedFd<'_> {
-        self.0[0].as_fd()
+        self.0.as_fd()
     }
 
     /// Makes the descriptor unreadable: process all that has arrived after this call.
     pub fn clear(&self) {
-        let mut bytes = [0; 64];
-        while matches!((&self.0[0]).read(&mut bytes), Ok(read) if read > 0) {}
+        let _ = read(self.descriptor(), &mut [0_u8; 8]);
     }
 
-    /// Wakes the loop. A full socket wakes it too.
     pub fn wake(&self) {
-        let _ = (&self.0[1]).write(&[1]);
+        let _ = write(self.descriptor(), &1_u64.to_ne_bytes());
     }
 }

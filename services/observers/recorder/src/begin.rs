@@ -3,13 +3,10 @@
 
 use std::{fs, path::Path};
 
-use gyre_recording::{Head, Ledger, Positions, next_part, parts};
+use gyre_recording::{Head, Ledger, Positions, RecordingError, next_part, parts};
 use gyre_stage::{Manifest, StageError, clock};
 
-use crate::{
-    RecorderError,
-    options::{HEALTH, LOG, Options},
-};
+use crate::options::{HEALTH, LOG, Options};
 
 pub(crate) struct Begun {
     pub head: Head,
@@ -23,10 +20,10 @@ pub(crate) fn begin(
     options: &Options,
     manifest: &Manifest,
     topics: &[String],
-) -> Result<Begun, RecorderError> {
+) -> Result<Begun, StageError> {
     let ledger = options.continues.then(|| Ledger::of(&manifest.out));
     let earlier = ledger.as_ref().map(|ledger| ledger.read(&options.to));
-    let earlier = earlier.transpose()?.flatten();
+    let earlier = earlier.transpose().map_err(failed)?.flatten();
     if earlier.is_none() {
         require_new(&options.to)?;
     }
@@ -55,20 +52,30 @@ pub(crate) fn begin(
     })
 }
 
-pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
-    match Ledger::of(out).read(file)? {
+pub fn require_own(file: &Path, out: &Path) -> Result<(), StageError> {
+    match Ledger::of(out).read(file).map_err(failed)? {
         Some(_) => Ok(()),
         None => require_new(file),
     }
 }
 
+/// A recording that cannot be written, or an earlier part that cannot be read.
+pub(crate) fn failed(error: RecordingError) -> StageError {
+    StageError::Input(format!(
+        "cannot record: {error}; the run continues without a recording"
+    ))
+}
+
 /// Checks that a new recording neither overwrites nor continues an existing one, even if only later
 /// parts are left.
-pub fn require_new(file: &Path) -> Result<(), RecorderError> {
+pub fn require_new(file: &Path) -> Result<(), StageError> {
     let first = parts(file).into_iter().next();
     // Also something else of that name, a folder for instance.
     match first.or(file.exists().then(|| file.to_owned())) {
-        Some(there) => Err(RecorderError::Exists(there)),
+        Some(there) => Err(StageError::Input(format!(
+            "{} exists, and a recording is never overwritten: name another file, or remove it",
+            there.display()
+        ))),
         None => Ok(()),
     }
 }

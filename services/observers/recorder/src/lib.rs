@@ -6,7 +6,6 @@
 //! run: see [`gyre_stage::observer`].
 
 mod begin;
-mod error;
 mod health;
 mod options;
 mod queue;
@@ -15,7 +14,6 @@ mod tap;
 mod writing;
 
 pub use begin::{require_new, require_own};
-pub use error::RecorderError;
 pub use gyre_recording::{Ledger, Split};
 pub use options::Options;
 pub use recorder::{Recorded, record};

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Message, Pose, Refined, Sender as PublishedBy, topic};
+use gyre_messages::{Message, Pose, topic};
 use gyre_recording::{LogTail, SplitWriter};
 use gyre_stage::{
     Manifest, StageError, clock, launch,
@@ -18,8 +18,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    RecorderError,
-    begin::begin,
+    begin::{begin, failed},
     health::health,
     options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
@@ -72,7 +71,7 @@ impl fmt::Display for Recorded {
     }
 }
 
-pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
+pub fn record(options: &Options) -> Result<Recorded, StageError> {
     let run = match std::env::var_os(run::ENVIRONMENT) {
         // The supervisor's own: its root is the same for other names of the folder.
         Some(root) if options.continues => ObservedRun::at(Path::new(&root))?,
@@ -92,7 +91,8 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     }
     let (to, split) = (options.to.clone(), options.split);
     let earlier = begun.earlier.unwrap_or_default();
-    let writer = SplitWriter::create(to, begun.head, split, begun.ledger, earlier)?;
+    let writer = SplitWriter::create(to, begun.head, split, begun.ledger, earlier);
+    let writer = writer.map_err(failed)?;
     let path = writer.file.path.clone();
     if options.continues {
         run.is_ready(NAME, &signals)?;
@@ -116,7 +116,9 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let ended = recorder.run_until_end(&writing);
     let counts: Vec<Counts> = recorder.taps.iter().map(|tap| tap.counts()).collect();
     drop(recorder);
-    writing.join().map_err(|_| RecorderError::Thread)??;
+    let died =
+        |_| StageError::Transient("the thread that writes the recording has ended".to_owned());
+    writing.join().map_err(died)?.map_err(failed)?;
     ended?;
     let recorded = Recorded { path, counts };
     match recorded.is_complete() {
@@ -126,18 +128,17 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     Ok(recorded)
 }
 
-fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RecorderError> {
+fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, StageError> {
     if named.is_empty() {
-        let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
-            Some(PublishedBy::Follower(follower)) => follower.is_in(&manifest.window),
-            _ => *name != Refined::TOPIC || manifest.refines,
-        };
-        let topics = DEFAULT.into_iter().filter(has).chain([LOG, HEALTH]);
+        let topics = DEFAULT.into_iter().filter(|name| manifest.has_topic(name));
+        let topics = topics.chain([LOG, HEALTH]);
         return Ok(topics.map(str::to_owned).collect());
     }
     let is_other = |name: &&String| *name != LOG && *name != HEALTH && topic(name).is_none();
     match named.iter().find(is_other) {
-        Some(unknown) => Err(RecorderError::NoTopic(unknown.clone())),
+        Some(unknown) => Err(StageError::Input(format!(
+            "there is no topic `{unknown}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix, log and health"
+        ))),
         None => Ok(named.to_vec()),
     }
 }

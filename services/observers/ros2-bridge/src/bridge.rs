@@ -6,7 +6,7 @@ use gyre_ros2_messages::{diagnostic_msgs::DiagnosticArray, frames, tf2_msgs::TFM
 use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
-    NodeError, Settings,
+    Settings,
     following::{ObjectTopics, PoseTopics, Topics, follow_runs},
     health::report,
     live_map::MapTopic,
@@ -30,7 +30,7 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    pub fn open(settings: Settings) -> Result<Self, NodeError> {
+    pub fn open(settings: Settings) -> Result<Self, StageError> {
         let mut node = Node::new(&settings.domain, &settings.namespace, NODE)?;
         Ok(Self {
             topics: Topics {

@@ -16,5 +16,4 @@ pub mod source;
 
 pub use bridge::Bridge;
 pub use gyre_ros2_messages::{BadMounting, Mounting, frames::Frames};
-pub use node::NodeError;
 pub use settings::{MapSettings, MapSettingsOf, Settings};

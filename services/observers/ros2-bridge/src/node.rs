@@ -1,8 +1,9 @@
 //! A node of ROS 2, and its topics.
 
-use std::{error::Error, fmt::Display, io, net::IpAddr, time::Duration};
+use std::{error::Error, fmt::Display, net::IpAddr, time::Duration};
 
 use gyre_ros2_messages::{Domain, Ros2Message};
+use gyre_stage::StageError;
 use ros2_client::{
     Context, MessageTypeName, Name, NodeName, NodeOptions, QosProfile, Subscription,
     dds::rustdds::DomainParticipantBuilder,
@@ -13,16 +14,6 @@ use crate::outlet::Outlet;
 
 /// The longest wait for slow readers, after which a message is dropped and counted.
 const MAX_WAIT: Duration = Duration::from_millis(100);
-
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct NodeError(pub(crate) String);
-
-impl From<io::Error> for NodeError {
-    fn from(error: io::Error) -> Self {
-        Self(format!("cannot wait for topics of ROS 2: {error}"))
-    }
-}
 
 pub struct Node {
     node: ros2_client::Node,
@@ -54,22 +45,22 @@ impl Keep {
 }
 
 impl Node {
-    pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, NodeError> {
+    pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, StageError> {
         let node_name = NodeName::new(namespace, name)
             .map_err(|reason| name_error(&format!("{namespace} {name}"), &reason))?;
         let joined = join(domain, node_name);
         joined.map_err(|reason| {
             let domain = domain.id();
-            NodeError(format!("cannot join domain {domain} of ROS 2: {reason}"))
+            StageError::Input(format!("cannot join domain {domain} of ROS 2: {reason}"))
         })
     }
 
-    pub fn dds_name(&self, topic: &str) -> Result<String, NodeError> {
+    pub fn dds_name(&self, topic: &str) -> Result<String, StageError> {
         Ok(format!("rt{}", self.absolute(topic)?))
     }
 
     /// Returns the absolute name of a topic: the library makes `//` of one in the root.
-    fn absolute(&self, topic: &str) -> Result<Name, NodeError> {
+    fn absolute(&self, topic: &str) -> Result<Name, StageError> {
         let name = name(topic)?;
         match name.is_absolute() {
             true => Ok(name),
@@ -84,7 +75,7 @@ impl Node {
         &mut self,
         topic: &str,
         keep: Keep,
-    ) -> Result<Outlet<M>, NodeError> {
+    ) -> Result<Outlet<M>, StageError> {
         let opened = self.open::<M>(topic, &keep.qos())?;
         let publisher = self.node.create_publisher(&opened, None);
         publisher
@@ -99,7 +90,7 @@ impl Node {
         topic: &str,
         depth: usize,
         is_lossy: bool,
-    ) -> Result<Subscription<M>, NodeError> {
+    ) -> Result<Subscription<M>, StageError> {
         let qos = match is_lossy {
             true => Keep::Last(depth).qos().reliability(Reliability::BestEffort),
             false => Keep::Last(depth).qos(),
@@ -122,7 +113,7 @@ impl Node {
         &self,
         topic: &str,
         qos: &QosProfile,
-    ) -> Result<ros2_client::dds::rustdds::Topic, NodeError> {
+    ) -> Result<ros2_client::dds::rustdds::Topic, StageError> {
         let definition = M::DEFINITION;
         let message = MessageTypeName::new(definition.package, definition.name);
         let opened = self.node.create_topic(&self.absolute(topic)?, message, qos);
@@ -143,16 +134,16 @@ fn join(domain: &Domain, name: NodeName) -> Result<Node, Box<dyn Error>> {
     Ok(Node { node, context })
 }
 
-fn name(topic: &str) -> Result<Name, NodeError> {
+fn name(topic: &str) -> Result<Name, StageError> {
     Name::parse(topic).map_err(|reason| name_error(topic, &reason))
 }
 
-fn name_error(name: &str, reason: &dyn Display) -> NodeError {
-    NodeError(format!(
+fn name_error(name: &str, reason: &dyn Display) -> StageError {
+    StageError::Input(format!(
         "`{name}` is no name of ROS 2: {reason}; names are letters, digits and single `_`, between single `/`"
     ))
 }
 
-fn topic_error(topic: &str, reason: &dyn Display) -> NodeError {
-    NodeError(format!("cannot open the topic {topic} of ROS 2: {reason}"))
+fn topic_error(topic: &str, reason: &dyn Display) -> StageError {
+    StageError::Input(format!("cannot open the topic {topic} of ROS 2: {reason}"))
 }

@@ -17,7 +17,7 @@ use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, Whe
 use gyre_stage::{Launch, StageCounters, StageError, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
 
-pub use ask::{AskError, ask};
+pub use ask::ask;
 pub use fixes::FixSettings;
 pub use gyre_stages::live_radar::Sizes;
 
@@ -84,6 +84,5 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Sta
         listen: gnss.listen,
     });
     let scans = settings.scans;
-    let radar = radar::Radar::open(settings).map_err(|error| StageError::Input(error.to_string()));
-    source::run_sensor(launch, &mut radar?, scans)
+    source::run_sensor(launch, &mut radar::Radar::open(settings)?, scans)
 }

@@ -1,12 +1,9 @@
-// The newest scan, drawn as the antenna turns: powers or the masked raster, and the points.
+// The newest scan: powers or the masked raster, and the points.
 
 import { Drawing, Labels, colour, isDark, roundUp } from "./canvas.js";
 import { Objects } from "./objects.js";
 
 const SIDE = 600; // Pixels of the picture on each side.
-const FRAME_MS = 45;
-const SHADES = 16; // Steps in which what was measured earlier fades.
-const FADED = 0.6;
 const BRIGHTEST_SHARE = 0.006;
 // From no return to the strongest: dark and light grounds.
 const STOPS = {
@@ -28,7 +25,7 @@ export class ScanView {
     this.objects = new Objects();
     this.rangeM = 0;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.shades = null;
+      this.colours = null;
       if (this.raster) this.setRaster(this.raster.header, this.raster.cells);
     });
   }
@@ -37,20 +34,11 @@ export class ScanView {
   setScan(header, buffer) {
     const powers = new Uint8Array(buffer);
     const old = this.header;
-    if (!old || old.azimuths !== header.azimuths || old.bins !== header.bins) {
-      this.shown = powers.slice();
-      this.cells = cellsOf(header);
-    } else {
-      this.sweepTo(1);
-    }
-    const now = performance.now();
-    const periodMs = this.arrived ? Math.min(Math.max(now - this.arrived, 60), 1000) : 250;
-    this.arrived = now;
-    Object.assign(this, { header, powers, swept: 0, periodMs });
+    if (old?.azimuths !== header.azimuths || old.bins !== header.bins) this.places = placesOf(header);
+    Object.assign(this, { header, powers });
     this.adapt(powers, header.floor);
-    if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.sweepTo(1);
-    this.animate();
     this.describe();
+    this.drawing.request();
   }
 
   setRaster(header, buffer) {
@@ -59,7 +47,7 @@ export class ScanView {
     picture.width = picture.height = header.side;
     const image = new ImageData(header.side, header.side);
     const pixels = new Uint32Array(image.data.buffer);
-    const colours = shadesOf({ low: 0, high: 200 })[0];
+    const colours = coloursOf({ low: 0, high: 200 });
     cells.forEach((value, index) => { pixels[index] = colours[value]; });
     picture.getContext("2d").putImageData(image, 0, 0);
     this.raster = { header, cells: buffer, picture };
@@ -71,7 +59,7 @@ export class ScanView {
 
   setPoints(header, buffer) {
     this.points = { unitM: header.unit_m, places: new Int16Array(buffer) };
-    if (this.layer === "raster") this.drawing.request();
+    this.drawing.request();
   }
 
   /** Takes the objects of a scan; null: the run has none. */
@@ -111,40 +99,10 @@ export class ScanView {
     let left = BRIGHTEST_SHARE * powers.length;
     let strong = 255;
     while (strong > 0 && (left -= counts[strong]) > 0) strong -= 1;
-    const blend = this.shades ? 0.2 : 1;
+    const blend = this.colours ? 0.2 : 1;
     this.levels.low += blend * (floor - this.levels.low);
     this.levels.high += blend * (Math.max(strong, floor + 40) - this.levels.high);
-    this.shades = shadesOf(this.levels);
-  }
-
-  animate() {
-    if (this.animating) return;
-    this.animating = true;
-    let drawn = 0;
-    const step = (now) => {
-      if (now - drawn >= FRAME_MS) {
-        drawn = now;
-        this.sweepTo((performance.now() - this.arrived) / this.periodMs);
-        this.drawing.now();
-      }
-      this.animating = this.swept < 1;
-      if (this.animating) requestAnimationFrame(step);
-      else this.drawing.request();
-    };
-    requestAnimationFrame(step);
-  }
-
-  // Shows the new scan up to this share of its turn.
-  sweepTo(share) {
-    const { header, powers, shown } = this;
-    const to = Math.min(share, 1);
-    const turn = header.clockwise ? -1 : 1;
-    const { azimuths, bins } = header;
-    for (let k = Math.floor(this.swept * azimuths); k < to * azimuths; k += 1) {
-      const first = (((header.first + turn * k) % azimuths) + azimuths) % azimuths * bins;
-      shown.set(powers.subarray(first, first + bins), first);
-    }
-    this.swept = to;
+    this.colours = coloursOf(this.levels);
   }
 
   draw(context, width, height) {
@@ -159,11 +117,10 @@ export class ScanView {
       const side = raster.header.width_m * scale;
       context.imageSmoothingEnabled = false;
       context.drawImage(raster.picture, -side / 2, -side / 2, side, side);
-    } else if (this.shown) {
+    } else if (this.powers) {
       this.paint();
       const side = 2 * this.header.max_range_m * scale;
       context.drawImage(this.picture, -side / 2, -side / 2, side, side);
-      if (this.swept < 1) this.drawBeam(context, rangeM * scale);
     }
     if (this.withPoints && this.points) this.drawPoints(context, scale);
     drawRings(context, labels, scale, rangeM, width, height);
@@ -174,32 +131,13 @@ export class ScanView {
 
   paint() {
     const pixels = new Uint32Array(this.image.data.buffer);
-    const { azimuths, clockwise, first } = this.header;
-    this.shades ??= shadesOf(this.levels);
-    // What the antenna passed longest ago is the faintest.
-    const head = first + (clockwise ? -1 : 1) * this.swept * azimuths;
-    const shadeOf = new Uint8Array(azimuths);
-    for (let azimuth = 0; azimuth < azimuths; azimuth += 1) {
-      const behind = (clockwise ? azimuth - head : head - azimuth) / azimuths;
-      shadeOf[azimuth] = this.swept < 1 ? (behind - Math.floor(behind)) * SHADES : 0;
-    }
-    const { places, azimuthOf } = this.cells;
+    this.colours ??= coloursOf(this.levels);
+    const { places, colours, powers } = this;
     for (let pixel = 0; pixel < pixels.length; pixel += 1) {
       const place = places[pixel];
-      pixels[pixel] = place < 0 ? 0 : this.shades[shadeOf[azimuthOf[pixel]]][this.shown[place]];
+      pixels[pixel] = place < 0 ? 0 : colours[powers[place]];
     }
     this.picture.getContext("2d").putImageData(this.image, 0, 0);
-  }
-
-  drawBeam(context, radius) {
-    const { azimuths, clockwise, first } = this.header;
-    const angle = ((first + (clockwise ? -1 : 1) * this.swept * azimuths) / azimuths) * 2 * Math.PI;
-    context.strokeStyle = colour("accent");
-    context.lineWidth = 1.5;
-    context.beginPath();
-    context.moveTo(0, 0);
-    context.lineTo(-Math.sin(angle) * radius, -Math.cos(angle) * radius);
-    context.stroke();
   }
 
   drawPoints(context, scale) {
@@ -214,10 +152,9 @@ export class ScanView {
   }
 }
 
-// For each pixel the cell of the scan that it shows: ahead is up.
-function cellsOf({ azimuths, bins }) {
+// For each pixel the cell of the scan that it shows, or -1: ahead is up.
+function placesOf({ azimuths, bins }) {
   const places = new Int32Array(SIDE * SIDE).fill(-1);
-  const azimuthOf = new Uint16Array(SIDE * SIDE);
   const middle = SIDE / 2;
   for (let row = 0; row < SIDE; row += 1) {
     for (let column = 0; column < SIDE; column += 1) {
@@ -225,26 +162,21 @@ function cellsOf({ azimuths, bins }) {
       const bin = Math.floor((Math.hypot(ahead, left) / middle) * bins);
       if (bin >= bins) continue;
       const turns = Math.atan2(left, ahead) / (2 * Math.PI) + 1;
-      const azimuth = Math.round(turns * azimuths) % azimuths;
-      places[row * SIDE + column] = azimuth * bins + bin;
-      azimuthOf[row * SIDE + column] = azimuth;
+      places[row * SIDE + column] = (Math.round(turns * azimuths) % azimuths) * bins + bin;
     }
   }
-  return { places, azimuthOf };
+  return places;
 }
 
-// For each shade the pixel of each power.
-function shadesOf({ low, high }) {
+// The pixel of each power.
+function coloursOf({ low, high }) {
   const stops = STOPS[isDark() ? "dark" : "light"];
-  return Array.from({ length: SHADES }, (_, shade) => {
-    const strength = 1 - ((1 - FADED) * shade) / (SHADES - 1);
-    return Uint32Array.from({ length: 256 }, (_, power) => {
-      const value = Math.sqrt(Math.min(Math.max((power - low) / (high - low), 0), 1)) * strength;
-      const at = Math.min(value * (stops.length - 1), stops.length - 1.001);
-      const [from, to] = [stops[Math.floor(at)], stops[Math.floor(at) + 1]];
-      const [red, green, blue] = from.map((part, k) => part + (at % 1) * (to[k] - part));
-      return ((255 << 24) | (blue << 16) | (green << 8) | red) >>> 0;
-    });
+  return Uint32Array.from({ length: 256 }, (_, power) => {
+    const value = Math.sqrt(Math.min(Math.max((power - low) / (high - low), 0), 1));
+    const at = Math.min(value * (stops.length - 1), stops.length - 1.001);
+    const [from, to] = [stops[Math.floor(at)], stops[Math.floor(at) + 1]];
+    const [red, green, blue] = from.map((part, k) => part + (at % 1) * (to[k] - part));
+    return ((255 << 24) | (blue << 16) | (green << 8) | red) >>> 0;
   });
 }
 

@@ -1,7 +1,6 @@
 //! Connections: a bounded number of them. A connection loses its permit by silence, and by not
 //! reading its answer.
 
-mod stream;
 #[cfg(test)]
 mod tests;
 
@@ -19,15 +18,15 @@ use tokio::{
     time,
 };
 
-use stream::Timed;
-
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// The most connections with requests at once. Streams have permits of their own.
     pub connections: u32,
     /// Time for the head of a request, from the connection or from the answer before.
     pub request: Duration,
-    pub answer: Duration,
+    /// Time for requests and answers, after which a connection takes no more requests; and time
+    /// again for the answer that it is at. Streams have limits of their own.
+    pub answers: Duration,
 }
 
 impl Default for Limits {
@@ -35,7 +34,7 @@ impl Default for Limits {
         Self {
             connections: 64,
             request: Duration::from_secs(10),
-            answer: Duration::from_secs(10),
+            answers: Duration::from_secs(10),
         }
     }
 }
@@ -63,17 +62,17 @@ pub async fn serve(
             () = stopped(&mut stop) => break,
         };
         let service = TowerToHyperService::new(router.clone());
-        let io = TokioIo::new(Timed::new(stream, limits.answer));
-        let connection = http.serve_connection(io, service).with_upgrades();
+        let connection = http.serve_connection(TokioIo::new(stream), service);
+        let connection = connection.with_upgrades();
         let mut stop = stop.clone();
         tokio::spawn(async move {
             let mut connection = pin!(connection);
             // A reader may disconnect at any time.
             tokio::select! {
                 _ = connection.as_mut() => {}
-                () = stopped(&mut stop) => {
+                _ = time::timeout(limits.answers, stopped(&mut stop)) => {
                     connection.as_mut().graceful_shutdown();
-                    let _ = connection.await;
+                    let _ = time::timeout(limits.answers, connection).await;
                 }
             }
             drop(permit);

@@ -1,138 +1,72 @@
 //! Delays of the last minute.
 
-use std::collections::VecDeque;
-
 use gyre_messages::{Item, StageId};
-use serde::Serialize;
+use serde_json::{Value, json};
 
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
-/// The most samples: above 136 poses a second the window is shorter than a minute.
-const MAX_SAMPLES: usize = 8192;
-/// Delays of a pose: sensor to pose, then hand-over and work of each stage.
-const KINDS: usize = 1 + 2 * StageId::ALL.len();
 
-#[derive(Debug, Default)]
-pub struct Delays {
-    samples: VecDeque<DelaySample>,
+/// Returns the percentiles of the poses of the last minute, ms: of sensor to pose, and of each stage
+/// the hand-over, from the publication by the stage before to the start of the work, and the work.
+pub fn report<'a>(items: impl Iterator<Item = &'a Item>, now_ns: i64) -> Value {
+    let items = items.filter(|item| finished_ns(item) >= now_ns - WINDOW_NS);
+    let items: Vec<&Item> = items.collect();
+    let mut of_stages = StageId::ALL.map(|_| (Vec::new(), Vec::new()));
+    for times in items.iter().flat_map(|item| item.hop_times()) {
+        let (hand_over, work) = &mut of_stages[times.stage as usize];
+        hand_over.push(times.transport_ns.unwrap_or(0) + times.wait_ns);
+        work.push(times.work_ns);
+    }
+    let percentiles = |delays_ns: Vec<i64>| {
+        let [p50_ms, p99_ms] = at(delays_ns, [0.5, 0.99])?;
+        Some(json!({"p50_ms": p50_ms, "p99_ms": p99_ms}))
+    };
+    let stages = StageId::ALL.into_iter().zip(of_stages);
+    let stages = stages.filter_map(|(stage, (hand_over, work))| {
+        let (hand_over, work) = (percentiles(hand_over)?, percentiles(work)?);
+        Some(json!({"stage": stage.name(), "hand_over": hand_over, "work": work}))
+    });
+    let sensor_to_pose = items.iter().map(|item| item.sensor_to_pose_ns());
+    let none = || json!({"p50_ms": 0.0, "p99_ms": 0.0});
+    json!({
+        "samples": items.len(),
+        "sensor_to_pose": percentiles(sensor_to_pose.collect()).unwrap_or_else(none),
+        "stages": stages.collect::<Vec<_>>(),
+        "series": series(&items, now_ns),
+    })
 }
 
-#[derive(Clone, Copy, Debug)]
-struct DelaySample {
-    /// The end of the last work, `CLOCK_MONOTONIC`.
-    at_ns: i64,
-    /// In us; `None` where the run has no such stage.
-    delays_us: [Option<u32>; KINDS],
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Percentiles {
-    p50_ms: f64,
-    p99_ms: f64,
-}
-
-/// Median and maximum of one second, ms: it has too few poses for a percentile beyond.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct SecondDelays {
-    p50_ms: f64,
-    max_ms: f64,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct StageDelays {
-    stage: &'static str,
-    /// From the publication by the stage before to the start of the work.
-    hand_over: Percentiles,
-    work: Percentiles,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct DelayReport {
-    samples: usize,
-    sensor_to_pose: Percentiles,
-    stages: Vec<StageDelays>,
-    /// Sensor to pose in each second of the last minute, oldest first; `None` without a pose.
-    series: Vec<Option<SecondDelays>>,
-}
-
-impl Delays {
-    pub fn add(&mut self, item: &Item) {
-        let mut delays_us = [None; KINDS];
-        delays_us[0] = Some(in_us(item.sensor_to_pose_ns()));
-        for times in item.hop_times() {
-            let [hand_over, work] = kinds(times.stage);
-            let waited_ns = times.transport_ns.unwrap_or(0) + times.wait_ns;
-            delays_us[hand_over] = Some(in_us(waited_ns));
-            delays_us[work] = Some(in_us(times.work_ns));
-        }
-        let at_ns = item.hops[StageId::PoseIntegration as usize].finished_ns;
-        self.samples.push_back(DelaySample { at_ns, delays_us });
-        if self.samples.len() > MAX_SAMPLES {
-            self.samples.pop_front();
+/// Returns median and maximum of sensor to pose in each second, oldest first: a second has too few
+/// poses for a percentile beyond. The last second is not over, and is left out.
+fn series(items: &[&Item], now_ns: i64) -> Vec<Option<Value>> {
+    let steps = WINDOW_NS / STEP_NS;
+    let mut of_step = vec![Vec::new(); steps as usize];
+    let end = now_ns / STEP_NS;
+    for item in items {
+        let step = finished_ns(item) / STEP_NS - (end - steps);
+        if (0..steps).contains(&step) {
+            of_step[step as usize].push(item.sensor_to_pose_ns());
         }
     }
-
-    /// Removes samples older than a minute, and returns the percentiles of the rest.
-    pub fn report(&mut self, now_ns: i64) -> DelayReport {
-        let is_old = |sample: &DelaySample| sample.at_ns < now_ns - WINDOW_NS;
-        while self.samples.front().is_some_and(is_old) {
-            self.samples.pop_front();
-        }
-        let of_kind = |kind: usize| {
-            let delays = self.samples.iter().filter_map(|it| it.delays_us[kind]);
-            let [p50_ms, p99_ms] = at(delays.collect(), [0.5, 0.99])?;
-            Some(Percentiles { p50_ms, p99_ms })
-        };
-        let stages = StageId::ALL.into_iter().filter_map(|stage| {
-            let [hand_over, work] = kinds(stage).map(of_kind);
-            Some(StageDelays {
-                stage: stage.name(),
-                hand_over: hand_over?,
-                work: work?,
-            })
-        });
-        DelayReport {
-            samples: self.samples.len(),
-            sensor_to_pose: of_kind(0).unwrap_or_default(),
-            stages: stages.collect(),
-            series: self.series(now_ns),
-        }
-    }
-
-    /// Returns the delays of each second; the last one is not over, and is left out.
-    fn series(&self, now_ns: i64) -> Vec<Option<SecondDelays>> {
-        let steps = WINDOW_NS / STEP_NS;
-        let mut of_step = vec![Vec::new(); steps as usize];
-        let end = now_ns / STEP_NS;
-        for sample in &self.samples {
-            let step = sample.at_ns / STEP_NS - (end - steps);
-            if (0..steps).contains(&step) {
-                of_step[step as usize].extend(sample.delays_us[0]);
-            }
-        }
-        let second = |delays_us| {
-            let [p50_ms, max_ms] = at(delays_us, [0.5, 1.0])?;
-            Some(SecondDelays { p50_ms, max_ms })
-        };
-        of_step.into_iter().map(second).collect()
-    }
+    let second = |delays_ns| {
+        let [p50_ms, max_ms] = at(delays_ns, [0.5, 1.0])?;
+        Some(json!({"p50_ms": p50_ms, "max_ms": max_ms}))
+    };
+    of_step.into_iter().map(second).collect()
 }
 
-fn kinds(stage: StageId) -> [usize; 2] {
-    let first = 1 + 2 * stage as usize;
-    [first, first + 1]
-}
-
-fn in_us(duration_ns: i64) -> u32 {
-    (duration_ns / 1000).clamp(0, u32::MAX.into()) as u32
+/// Returns the end of the last work on an item.
+fn finished_ns(item: &Item) -> i64 {
+    item.hops[StageId::PoseIntegration as usize].finished_ns
 }
 
 /// Returns the values at these shares of their order, ms; `None` of no values.
-fn at(mut delays_us: Vec<u32>, shares: [f64; 2]) -> Option<[f64; 2]> {
-    let last = delays_us.len().checked_sub(1)? as f64;
-    delays_us.sort_unstable();
-    Some(shares.map(|share| f64::from(delays_us[(last * share).round() as usize]) * 1e-3))
+fn at(mut delays_ns: Vec<i64>, shares: [f64; 2]) -> Option<[f64; 2]> {
+    let last = delays_ns.len().checked_sub(1)? as f64;
+    delays_ns.sort_unstable();
+    let delay_ns = |share: f64| delays_ns[(last * share).round() as usize].max(0);
+    Some(shares.map(|share| delay_ns(share) as f64 / 1e6))
 }
 
 #[cfg(test)]
@@ -160,34 +94,33 @@ mod tests {
 
     #[test]
     fn delays_are_those_of_the_last_minute() {
-        let mut delays = Delays::default();
         let now_ns = 200 * STEP_NS + STEP_NS / 2;
-        delays.add(&pose(now_ns - WINDOW_NS - 1, 900));
-        for second in 1..=50 {
-            delays.add(&pose(now_ns - second * STEP_NS, second));
-        }
-        let report = delays.report(now_ns);
-        assert_eq!(report.samples, 50);
-        assert_eq!(report.sensor_to_pose.p99_ms, 50.0);
-        assert_eq!(report.series.len(), 60);
-        assert_eq!(report.series.iter().flatten().count(), 50);
-        let newest = report.series.last().copied().flatten();
-        assert_eq!(newest.map(|it| (it.p50_ms, it.max_ms)), Some((1.0, 1.0)));
-        let later = delays.report(now_ns + 2 * WINDOW_NS);
-        assert_eq!((later.samples, later.series), (0, vec![None; 60]));
-        (0..10_000).for_each(|k| delays.add(&pose(k * 1_000_000, 1)));
-        assert_eq!(delays.report(10_000_000_000).samples, MAX_SAMPLES);
+        let mut items = vec![pose(now_ns - WINDOW_NS - 1, 900)];
+        items.extend((1..=50).map(|second| pose(now_ns - second * STEP_NS, second)));
+        let found = report(items.iter(), now_ns);
+        assert_eq!(found["samples"], 50);
+        assert_eq!(found["sensor_to_pose"]["p99_ms"], 50.0);
+        let seconds_of = |report: &Value| report["series"].as_array().cloned().unwrap_or_default();
+        let seconds = seconds_of(&found);
+        let seen = seconds.iter().filter(|second| !second.is_null());
+        assert_eq!((seconds.len(), seen.count()), (60, 50));
+        assert_eq!(seconds[59], json!({"p50_ms": 1.0, "max_ms": 1.0}));
+        let later = report(items.iter(), now_ns + 2 * WINDOW_NS);
+        assert_eq!(later["samples"], 0);
+        assert_eq!(seconds_of(&later), vec![Value::Null; 60]);
     }
 
     #[test]
     fn each_stage_of_the_run_has_its_hand_over_and_its_work() {
-        let mut delays = Delays::default();
-        delays.add(&pose(STEP_NS, 5));
-        let report = delays.report(STEP_NS);
-        let names: Vec<_> = report.stages.iter().map(|stage| stage.stage).collect();
-        assert_eq!(names, ["masking", "pose-integration"]);
+        let found = report([pose(STEP_NS, 5)].iter(), STEP_NS);
+        let [first, second] = [0_usize, 1].map(|index| &found["stages"][index]);
+        assert_eq!(
+            [&first["stage"], &second["stage"]],
+            ["masking", "pose-integration"]
+        );
+        assert_eq!(found["stages"][2], Value::Null);
         // Published 0.7 ms after its receipt at -2 ms, received at -0.6 ms, begun 0.1 ms later.
-        assert_eq!(report.stages[1].hand_over.p50_ms, 0.8);
-        assert_eq!(report.stages[1].work.p50_ms, 0.5);
+        assert_eq!(second["hand_over"]["p50_ms"], 0.8);
+        assert_eq!(second["work"]["p50_ms"], 0.5);
     }
 }

@@ -1,10 +1,7 @@
 //! The delays of all poses, in buckets as Prometheus counts them.
 
 use gyre_messages::{Item, StageId};
-use prometheus_client::{
-    encoding::EncodeLabelSet,
-    metrics::{family::Family, histogram::Histogram},
-};
+use prometheus_client::metrics::{family::Family, histogram::Histogram};
 
 const HOP_BUCKETS_S: [f64; 15] = [
     0.000_05, 0.000_1, 0.000_25, 0.000_5, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5,
@@ -17,17 +14,11 @@ const POSE_BUCKETS_S: [f64; 14] = [
 #[derive(Clone, Debug)]
 pub struct Histograms {
     pub sensor_to_pose: Histogram,
-    pub hops: HopHistograms,
+    pub hops: Family<HopLabels, Histogram, fn() -> Histogram>,
 }
 
-pub type HopHistograms = Family<HopLabels, Histogram, fn() -> Histogram>;
-
-/// A part of a stage's time for a scan: `transport`, `wait` or `work`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub struct HopLabels {
-    stage: &'static str,
-    part: &'static str,
-}
+/// A stage, and a part of its time for a scan: `transport`, `wait` or `work`.
+type HopLabels = [(&'static str, &'static str); 2];
 
 impl Default for Histograms {
     fn default() -> Self {
@@ -54,8 +45,10 @@ impl Histograms {
                     continue;
                 };
                 let stage = StageId::name(times.stage);
-                let hop = self.hops.get_or_create(&HopLabels { stage, part });
-                hop.observe(seconds(duration_ns));
+                let labels = [("stage", stage), ("part", part)];
+                self.hops
+                    .get_or_create(&labels)
+                    .observe(seconds(duration_ns));
             }
         }
     }

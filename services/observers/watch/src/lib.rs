@@ -25,4 +25,4 @@ mod stream;
 mod track;
 
 pub use access::Token;
-pub use server::{Endpoint, Server, WatchError};
+pub use server::{Endpoint, Server};

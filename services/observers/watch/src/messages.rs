@@ -6,7 +6,7 @@ use gyre_messages::{
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::{delays::DelayReport, processes::Process, track::Vertex};
+use crate::{processes::Process, track::Vertex};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
@@ -53,7 +53,6 @@ pub struct RunInfo {
     pub rate: Option<f64>,
     pub window: usize,
     pub objects: bool,
-    pub version: &'static str,
 }
 
 #[derive(Debug, Serialize)]
@@ -63,7 +62,7 @@ pub struct HealthReport {
     pub counts: RunCounts,
     pub scans_per_s: f64,
     pub distance_m: f64,
-    pub delays: DelayReport,
+    pub delays: Value,
     /// The part of gyro, wheels and Doppler in the last motions, and the rates of their samples, in
     /// words; none without them.
     pub others: Option<String>,
@@ -106,48 +105,30 @@ pub fn objects(header: &ObjectsHeader) -> Value {
     })
 }
 
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct CurrentPose {
-    pub seq: u64,
-    pub scan: u64,
-    pub stamp_ns: i64,
-    /// x, y (m), yaw (rad), and the covariance of the position (m^2).
-    pub vertex: Vertex,
-    pub speed_mps: f64,
-    pub yaw_rate_radps: f64,
-    pub stationary: bool,
-    /// The outcome of the match: `searched`, `refined`, `weak` or `predicted`.
-    pub outcome: &'static str,
-    /// Mean of the map under the scan's points, 0 to 1.
-    pub overlap: f64,
-    /// The basis of the motion in words: see [`gyre_messages::Basis`].
-    pub basis: &'static str,
-}
-
-impl CurrentPose {
-    pub fn of(pose: &PoseHeader) -> Self {
-        let interval_s = pose.motion.interval_ns as f64 * 1e-9;
-        // The chain starts with a motion of no duration.
-        let per_s = |value: f64| match interval_s > 0.0 {
-            true => value / interval_s,
-            false => 0.0,
-        };
-        Self {
-            seq: pose.item.seq,
-            scan: pose.item.scan,
-            stamp_ns: pose.item.stamp_ns,
-            vertex: Vertex::of(pose),
-            speed_mps: per_s(pose.motion.x_m.hypot(pose.motion.y_m)),
-            yaw_rate_radps: per_s(pose.motion.yaw_rad),
-            stationary: pose.motion.refinement.is_stationary(),
-            outcome: match pose.motion.refinement.outcome {
-                outcome::REFINED => "refined",
-                outcome::WEAK => "weak",
-                outcome::PREDICTED => "predicted",
-                _ => "searched",
-            },
-            overlap: pose.motion.refinement.overlap,
-            basis: pose.motion.refinement.basis().name(),
-        }
-    }
+/// Returns the newest pose, with the outcome of its match and the basis of its motion in words.
+pub fn pose(pose: &PoseHeader) -> Value {
+    let (motion, record) = (&pose.motion, &pose.motion.refinement);
+    let interval_s = motion.interval_ns as f64 * 1e-9;
+    // The chain starts with a motion of no duration.
+    let per_s = |value: f64| match interval_s > 0.0 {
+        true => value / interval_s,
+        false => 0.0,
+    };
+    json!({
+        "seq": pose.item.seq,
+        "scan": pose.item.scan,
+        "vertex": Vertex::of(pose),
+        "speed_mps": per_s(motion.x_m.hypot(motion.y_m)),
+        "yaw_rate_radps": per_s(motion.yaw_rad),
+        "stationary": record.is_stationary(),
+        "outcome": match record.outcome {
+            outcome::REFINED => "refined",
+            outcome::WEAK => "weak",
+            outcome::PREDICTED => "predicted",
+            _ => "searched",
+        },
+        // Mean of the map under the scan's points, 0 to 1.
+        "overlap": record.overlap,
+        "basis": record.basis().name(),
+    })
 }

@@ -105,31 +105,21 @@ fn follow_poses(
 ) -> Result<(), StageError> {
     let view = &followed.view;
     let mut poses = run.observe::<Pose>()?;
-    let mut missed = 0;
     // Without a place for it the rates are missing, and nothing else.
     let has_samples = run.manifest().limits.samples > 0;
     let mut scans = has_samples.then(|| run.observe::<Scan>().ok()).flatten();
     view.set_notice(None);
     while !view.is_stopping() {
-        let limit = match track.catch_up(|pose| view.add_to_track(pose)) {
-            true => Duration::ZERO,
-            false => POLL_INTERVAL,
-        };
-        match poses.next(limit)? {
-            Next::Message(message, _) => {
+        match poses.next(POLL_INTERVAL)? {
+            Next::Message(message, missed) => {
+                view.add_missed(Pose::TOPIC, missed);
                 let pose = message.header();
                 view.add_pose(pose);
                 track.see(pose, |pose| view.add_to_track(pose));
             }
             Next::Idle => {}
-            Next::Ended => {
-                // The remaining poses of the journal.
-                while !view.is_stopping() && track.catch_up(|pose| view.add_to_track(pose)) {}
-                break;
-            }
+            Next::Ended => break,
         }
-        view.add_missed(Pose::TOPIC, poses.missed().saturating_sub(missed));
-        missed = poses.missed();
         if let Some(scans) = &mut scans {
             while let Next::Message(scan, _) = scans.next(Duration::ZERO)? {
                 view.add_samples(scan.header(), scan.values());
@@ -150,9 +140,7 @@ fn follow_pictures<M: Message>(
         let mut drawn: Option<Instant> = None;
         let failed = follow_topic::<M>(followed, &is_wanted, |message, missed| {
             view.add_missed(M::TOPIC, missed);
-            if let Some(message) = message
-                && drawn.is_none_or(|drawn| drawn.elapsed() >= PICTURE_INTERVAL)
-            {
+            if drawn.is_none_or(|drawn| drawn.elapsed() >= PICTURE_INTERVAL) {
                 drawn = Some(Instant::now());
                 picture(view, message);
             }
@@ -170,11 +158,11 @@ fn follow_pictures<M: Message>(
 }
 
 /// Waits for a poll, and follows a topic of the run, if there is one, as long as the topic is
-/// wanted: calls `take` with each message, and with the number of those missed since the last call.
+/// wanted: calls `take` with each message, and with the number of those missed before it.
 pub fn follow_topic<M: Message>(
     followed: &Followed,
     is_wanted: &dyn Fn() -> bool,
-    mut take: impl FnMut(Option<&Received<M>>, u64),
+    mut take: impl FnMut(&Received<M>, u64),
 ) -> Result<(), StageError> {
     thread::sleep(POLL_INTERVAL);
     if !is_wanted() || followed.view.run().state != RunState::Working {
@@ -182,16 +170,12 @@ pub fn follow_topic<M: Message>(
     }
     let followed = ObservedRun::writing_to(&followed.out).and_then(|run| {
         let mut observer = run.observe::<M>()?;
-        let mut counted = 0;
         while is_wanted() {
             match observer.next(POLL_INTERVAL)? {
-                Next::Message(message, _) => take(Some(message), 0),
+                Next::Message(message, missed) => take(message, missed),
                 Next::Idle => {}
                 Next::Ended => break,
             }
-            let missed = observer.missed();
-            take(None, missed.saturating_sub(counted));
-            counted = missed;
         }
         Ok(())
     });

@@ -52,8 +52,6 @@ pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Byte
         "bins": bins,
         // Of the outer edge of the last bin.
         "max_range_m": f64::from(scan.range_m((bins * bins_of_one) as f32 - 0.5)),
-        "first": column(0),
-        "clockwise": geometry.sense == Sense::Clockwise,
         // Weaker powers are noise, and sent as 0.
         "floor": floor,
     });

@@ -1,6 +1,6 @@
 //! The processes of the run: their states by the supervisor, and their usage by the kernel.
 
-use std::{collections::BTreeMap, path::Path, time::Instant};
+use std::{collections::BTreeMap, mem, path::Path, time::Instant};
 
 use gyre_stage::{
     control::{Activity, Control, Status},
@@ -58,25 +58,19 @@ impl ProcessMeter {
             ..Process::default()
         };
         let mut processes: Vec<_> = [supervisor].into_iter().chain(others).collect();
-        self.measure(&mut processes);
-        Some((status, processes))
-    }
-
-    fn measure(&mut self, processes: &mut [Process]) {
-        let now = Instant::now();
-        let mut after = BTreeMap::new();
-        for process in processes {
+        let (now, earlier) = (Instant::now(), mem::take(&mut self.before));
+        for process in &mut processes {
             let Some(usage) = Usage::of(process.pid) else {
                 continue;
             };
-            let before = self.before.get(&process.pid);
+            let before = earlier.get(&process.pid);
             process.processor_share =
-                before.map(|(at, before)| usage.processor_share(before, now.duration_since(*at)));
+                before.map(|(at, before)| usage.processor_share(before, now - *at));
             process.cpu_s = Some(usage.cpu_s);
             process.own_bytes = Some(usage.own_bytes);
-            after.insert(process.pid, (now, usage));
+            self.before.insert(process.pid, (now, usage));
         }
-        self.before = after;
+        Some((status, processes))
     }
 }
 

@@ -2,16 +2,13 @@
 
 use std::{
     collections::VecDeque,
-    sync::{
-        Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-    },
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use axum::extract::ws::Message;
 use gyre_messages::{
-    Message as _, Objects, ObjectsHeader, Pose, PoseHeader, RefinementRecord, SampleRates, Scan,
-    ScanHeader, WitnessCounts, flag,
+    Message as _, Objects, ObjectsHeader, Pose, PoseHeader, SampleRates, Scan, ScanHeader,
+    WitnessCounts, flag,
 };
 use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
@@ -19,9 +16,9 @@ use serde_json::json;
 use tokio::sync::watch;
 
 use crate::{
-    delays::Delays,
+    delays,
     histograms::Histograms,
-    messages::{self, CurrentPose, HealthReport, Layer, RunCounts, RunInfo, RunState},
+    messages::{self, HealthReport, Layer, RunCounts, RunInfo, RunState},
     pictures::PackedPoints,
     processes::Process,
     recent_drift::RecentDrift,
@@ -31,15 +28,14 @@ use crate::{
 /// The number of motions for which the page shows the share of gyro, wheels and Doppler: ten
 /// seconds at 4 Hz.
 const LAST_MOTIONS: usize = 40;
-/// The number of poses that are kept for scans whose points come later.
-const RECENT: usize = 256;
+/// The number of poses that are kept: a minute at 136 Hz.
+const MAX_POSES: usize = 8192;
 
 #[derive(Default)]
 pub struct RunView {
     state: Mutex<ViewState>,
     /// The newest pictures and reports. A slow browser receives the newest, and not those between.
     pub updates: Updates,
-    wanted: [AtomicUsize; 4],
     pub histograms: Histograms,
 }
 
@@ -64,12 +60,10 @@ struct ViewState {
     run: RunInfo,
     track: Track,
     drift: RecentDrift,
-    delays: Delays,
-    latest: Option<CurrentPose>,
+    /// The last poses, the newest at the end.
+    poses: VecDeque<PoseHeader>,
     counts: RunCounts,
-    last_motions: VecDeque<RefinementRecord>,
     rates: SampleRates,
-    recent: VecDeque<(u64, [f64; 3])>,
     /// Points that wait for the pose of their scan.
     pending: Option<(u64, PackedPoints)>,
     reported: Option<(i64, u64)>,
@@ -133,7 +127,6 @@ impl RunView {
     fn update_run(&self, change: impl FnOnce(&mut RunInfo)) {
         let mut state = self.state();
         change(&mut state.run);
-        state.run.version = env!("CARGO_PKG_VERSION");
         send_json(&self.updates.run, &state.run);
     }
 
@@ -151,32 +144,23 @@ impl RunView {
     pub fn add_pose(&self, pose: &PoseHeader) {
         let mut state = self.state();
         let state = &mut *state;
-        let has_pose = |latest: CurrentPose| latest.seq >= pose.item.seq;
-        if state.latest.is_some_and(has_pose) {
+        let has_pose = |latest: &PoseHeader| latest.item.seq >= pose.item.seq;
+        if state.poses.back().is_some_and(has_pose) {
             return;
         }
         self.histograms.add(&pose.item);
-        state.delays.add(&pose.item);
-        state.latest = Some(CurrentPose::of(pose));
+        state.poses.push_back(*pose);
+        if state.poses.len() > MAX_POSES {
+            state.poses.pop_front();
+        }
         state.counts.poses = pose.item.seq + 1;
         state.counts.dropped = pose.item.dropped();
         // The supervisor is asked once a second.
         let with_pose = state.counts.poses + state.counts.dropped;
         state.counts.published = state.counts.published.max(with_pose);
-        if !pose.item.is(flag::BREAK) {
-            state.last_motions.push_back(pose.motion.refinement);
-        }
-        if state.last_motions.len() > LAST_MOTIONS {
-            state.last_motions.pop_front();
-        }
-        let (seq, place) = (pose.item.seq, [pose.x_m, pose.y_m, pose.yaw_rad]);
-        state.recent.push_back((seq, place));
-        if state.recent.len() > RECENT {
-            state.recent.pop_front();
-        }
-        let waits_for_this = |pending: &mut (u64, PackedPoints)| pending.0 == seq;
+        let waits_for_this = |pending: &mut (u64, PackedPoints)| pending.0 == pose.item.seq;
         if let Some((_, points)) = state.pending.take_if(waits_for_this) {
-            self.send_points(&points, place, seq);
+            self.send_points(&points, pose);
         }
     }
 
@@ -189,14 +173,15 @@ impl RunView {
     /// Adds the points of a scan. They are sent with its pose, now or when it comes.
     pub fn add_points(&self, points: PackedPoints, seq: u64) {
         let mut state = self.state();
-        match state.recent.iter().rev().find(|(of, _)| *of == seq) {
-            Some((_, place)) => self.send_points(&points, *place, seq),
+        match state.poses.iter().rev().find(|pose| pose.item.seq == seq) {
+            Some(pose) => self.send_points(&points, pose),
             None => state.pending = Some((seq, points)),
         }
     }
 
-    fn send_points(&self, points: &PackedPoints, place: [f64; 3], seq: u64) {
-        if let Ok(message) = points.at(place, seq) {
+    fn send_points(&self, points: &PackedPoints, pose: &PoseHeader) {
+        let place = [pose.x_m, pose.y_m, pose.yaw_rad];
+        if let Ok(message) = points.at(place, pose.item.seq) {
             let points = self.updates.of(Layer::Points);
             points.send_replace(Some(Message::Binary(message)));
         }
@@ -254,7 +239,7 @@ impl RunView {
             counts,
             scans_per_s,
             distance_m: state.track.length_m(),
-            delays: state.delays.report(now_ns),
+            delays: delays::report(state.poses.iter().map(|pose| &pose.item), now_ns),
             others: others(&state),
             notice: state.notice.clone(),
             processes: state.processes.clone(),
@@ -266,7 +251,8 @@ impl RunView {
     /// if there are no new poses.
     pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Message> {
         let state = self.state();
-        let seq = state.latest.map(|latest| latest.seq);
+        let latest = state.poses.back();
+        let seq = latest.map(|latest| latest.item.seq);
         let (vertices, replace) = state.track.since(cursor);
         if vertices.is_empty() && !replace && seq == *last {
             return None;
@@ -276,7 +262,7 @@ impl RunView {
             "kind": "poses",
             "replace": replace,
             "vertices": vertices,
-            "pose": state.latest,
+            "pose": latest.map(messages::pose),
             "drift": state.drift.drift(),
         }))
     }
@@ -284,7 +270,7 @@ impl RunView {
     /// Returns the trajectory: x, y (m), yaw (rad).
     pub fn trajectory(&self) -> Vec<[f64; 3]> {
         let state = self.state();
-        let latest = state.latest.map(|latest| latest.vertex);
+        let latest = state.poses.back().map(Vertex::of);
         let (vertices, _) = state.track.since(&mut Cursor::default());
         let vertices = vertices.iter().chain(&latest);
         let poses = vertices.map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw]);
@@ -293,22 +279,15 @@ impl RunView {
 
     /// Returns the time of the newest pose on the sensor's clock, ns.
     pub fn newest_stamp_ns(&self) -> Option<i64> {
-        self.state().latest.map(|latest| latest.stamp_ns)
-    }
-
-    pub fn want(&self, layer: Layer, more: bool) {
-        let wanted = &self.wanted[layer as usize];
-        match more {
-            true => wanted.fetch_add(1, Ordering::Relaxed),
-            false => wanted.fetch_sub(1, Ordering::Relaxed),
-        };
+        let state = self.state();
+        state.poses.back().map(|latest| latest.item.stamp_ns)
     }
 
     pub fn is_wanted(&self, layer: Layer) -> bool {
         if layer == Layer::Objects && !self.state().run.objects {
             return false;
         }
-        self.wanted[layer as usize].load(Ordering::Relaxed) > 0
+        self.updates.of(layer).receiver_count() > 0
     }
 
     pub fn stop(&self) {
@@ -321,7 +300,10 @@ impl RunView {
 }
 
 fn others(state: &ViewState) -> Option<String> {
-    let used = WitnessCounts::of(&state.last_motions).in_words();
+    let motions = state.poses.iter().rev();
+    let motions = motions.filter(|pose| !pose.item.is(flag::BREAK));
+    let motions = motions.map(|pose| &pose.motion.refinement);
+    let used = WitnessCounts::of(motions.take(LAST_MOTIONS)).in_words();
     let samples = state.counts.samples.in_words();
     let words: Vec<String> = used.into_iter().chain(samples).collect();
     (!words.is_empty()).then(|| words.join("; "))
@@ -395,6 +377,13 @@ mod tests {
     }
 
     #[test]
+    fn the_poses_that_are_kept_are_bounded() {
+        let view = RunView::new("out");
+        (0..10_000).for_each(|seq| view.add_pose(&pose(seq)));
+        assert_eq!(view.state().poses.len(), MAX_POSES);
+    }
+
+    #[test]
     fn a_browser_receives_what_is_new_and_nothing_twice() {
         let view = RunView::new("out");
         let (mut cursor, mut last) = (Cursor::default(), None);
@@ -419,7 +408,7 @@ mod tests {
     #[test]
     fn objects_are_wanted_of_a_run_that_has_them_and_have_places_velocities_and_sizes() {
         let view = RunView::new("out");
-        view.want(Layer::Objects, true);
+        let _browser = view.updates.of(Layer::Objects).subscribe();
         assert!(!view.is_wanted(Layer::Objects));
         view.update_run(|run| run.objects = true);
         assert!(view.is_wanted(Layer::Objects));

@@ -17,8 +17,7 @@ use axum::{
     response::{IntoResponse, Redirect, Response},
     routing::get,
 };
-use gyre_stage::{StageError, wake::Signals};
-use thiserror::Error;
+use gyre_stage::wake::Signals;
 use tokio::{
     runtime,
     sync::{Semaphore, watch},
@@ -46,19 +45,6 @@ const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Time for the connections to end with the program.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
-#[derive(Debug, Error)]
-pub enum WatchError {
-    #[error("cannot serve at {address}: {source}; choose another address")]
-    Listen {
-        address: SocketAddr,
-        source: io::Error,
-    },
-    #[error("cannot serve: {0}")]
-    Serve(#[from] io::Error),
-    #[error(transparent)]
-    Stage(#[from] StageError),
-}
-
 pub struct Endpoint {
     listener: TcpListener,
     address: SocketAddr,
@@ -80,8 +66,12 @@ struct Shared {
 
 impl Endpoint {
     /// Listens at an address. Without a token only this machine is answered.
-    pub fn listen(address: SocketAddr, token: Option<Token>) -> Result<Self, WatchError> {
-        let failed = |source| WatchError::Listen { address, source };
+    pub fn listen(address: SocketAddr, token: Option<Token>) -> io::Result<Self> {
+        let failed = |error: io::Error| {
+            io::Error::other(format!(
+                "cannot serve at {address}: {error}; choose another address"
+            ))
+        };
         let listener = TcpListener::bind(address).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         Ok(Self {
@@ -123,7 +113,7 @@ impl Server {
         out: PathBuf,
         is_complete: fn(&Path) -> bool,
         signals: &Signals,
-    ) -> Result<(), WatchError> {
+    ) -> io::Result<()> {
         let view = Arc::new(RunView::new(&out.display().to_string()));
         let hub = Arc::new(Hub::default());
         let followed = Arc::new(Followed {
@@ -143,13 +133,13 @@ impl Server {
             serving.stop();
             served
         })?;
-        while !view.is_stopping() && !signals.sleep(POLL_INTERVAL)? {}
+        while !view.is_stopping() && !signals.sleep(POLL_INTERVAL).map_err(io::Error::other)? {}
         view.stop();
         for thread in threads {
             let _ = thread.join();
         }
         let died = || io::Error::other("its thread has died");
-        Ok(server.join().unwrap_or_else(|_| Err(died()))?)
+        server.join().unwrap_or_else(|_| Err(died()))
     }
 
     fn serve(self, view: &Arc<RunView>, hub: Arc<Hub>) -> io::Result<()> {

@@ -1,6 +1,6 @@
 //! One browser: the layers that it wants, and the messages to it.
 
-use std::{sync::Arc, time::Duration};
+use std::{future, sync::Arc, time::Duration};
 
 use axum::extract::ws::{Message, WebSocket};
 use tokio::{
@@ -14,43 +14,17 @@ use crate::{
     track::Cursor,
 };
 
+type Changes = Receiver<Option<Message>>;
+
 const POSES_INTERVAL: Duration = Duration::from_millis(200);
 const MAX_SEND: Duration = Duration::from_secs(10);
-/// The layers by the names that a browser gives them, in the order of their numbers.
+/// The layers by the names that a browser gives them, the smallest first.
 const LAYERS: [(&str, Layer); 4] = [
-    ("scan", Layer::Scan),
-    ("raster", Layer::Raster),
-    ("points", Layer::Points),
     ("objects", Layer::Objects),
+    ("points", Layer::Points),
+    ("raster", Layer::Raster),
+    ("scan", Layer::Scan),
 ];
-
-struct Wanted {
-    view: Arc<RunView>,
-    layers: [bool; 4],
-}
-
-impl Wanted {
-    fn set(&mut self, names: &str) {
-        for (name, layer) in LAYERS {
-            let is_wanted = names.split(' ').any(|named| named == name);
-            let was_wanted = &mut self.layers[layer as usize];
-            if *was_wanted != is_wanted {
-                self.view.want(layer, is_wanted);
-                *was_wanted = is_wanted;
-            }
-        }
-    }
-
-    fn has(&self, layer: Layer) -> bool {
-        self.layers[layer as usize]
-    }
-}
-
-impl Drop for Wanted {
-    fn drop(&mut self) {
-        self.set("");
-    }
-}
 
 pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
     let updates = &view.updates;
@@ -61,35 +35,38 @@ pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
         receiver
     };
     let (mut run, mut health) = (subscribe(&updates.run), subscribe(&updates.health));
-    let [mut scan, mut raster, mut points, mut objects] =
-        LAYERS.map(|(_, layer)| subscribe(updates.of(layer)));
+    // Of the layers that this browser wants: they are made while somebody receives them.
+    let mut layers: [Option<Changes>; 4] = Default::default();
     let mut stop = updates.stop.subscribe();
-    let mut wanted = Wanted {
-        view: Arc::clone(&view),
-        layers: [false; 4],
-    };
     let (mut cursor, mut last) = (Cursor::default(), None);
     let mut tick = time::interval(POSES_INTERVAL);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
+        let [objects, points, raster, scan] = &mut layers;
         let message = tokio::select! {
             biased;
             _ = stop.wait_for(|stop| *stop) => Some(Message::Close(None)),
             received = socket.recv() => match received {
                 Some(Ok(Message::Text(names))) => {
-                    wanted.set(&names);
+                    for ((name, layer), receiver) in LAYERS.into_iter().zip(&mut layers) {
+                        if !names.split(' ').any(|named| named == name) {
+                            *receiver = None;
+                        } else if receiver.is_none() {
+                            *receiver = Some(subscribe(updates.of(layer)));
+                        }
+                    }
                     None
                 }
                 Some(Ok(Message::Close(_)) | Err(_)) | None => return,
                 Some(Ok(_)) => None,
             },
-            Ok(()) = run.changed() => newest(&mut run),
-            Ok(()) = health.changed() => newest(&mut health),
+            message = next(Some(&mut run)) => message,
+            message = next(Some(&mut health)) => message,
             _ = tick.tick() => view.poses(&mut cursor, &mut last),
-            Ok(()) = objects.changed(), if wanted.has(Layer::Objects) => newest(&mut objects),
-            Ok(()) = points.changed(), if wanted.has(Layer::Points) => newest(&mut points),
-            Ok(()) = raster.changed(), if wanted.has(Layer::Raster) => newest(&mut raster),
-            Ok(()) = scan.changed(), if wanted.has(Layer::Scan) => newest(&mut scan),
+            message = next(objects.as_mut()) => message,
+            message = next(points.as_mut()) => message,
+            message = next(raster.as_mut()) => message,
+            message = next(scan.as_mut()) => message,
         };
         let Some(message) = message else { continue };
         let is_last = matches!(message, Message::Close(_));
@@ -100,6 +77,12 @@ pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
     }
 }
 
-fn newest(updates: &mut Receiver<Option<Message>>) -> Option<Message> {
-    updates.borrow_and_update().clone()
+/// Waits for the next change; for ever without a receiver.
+async fn next(changes: Option<&mut Changes>) -> Option<Message> {
+    let Some(changes) = changes else {
+        return future::pending().await;
+    };
+    // The view is not dropped before its browsers.
+    let _ = changes.changed().await;
+    changes.borrow_and_update().clone()
 }

@@ -7,6 +7,7 @@ use std::{
 };
 
 use gyre_colossus::{Address, Configuration, Event, Message, Request, SweepAssembler};
+use gyre_datasets::DatasetOptions;
 use gyre_radar::ScanLimits;
 use thiserror::Error;
 
@@ -23,14 +24,14 @@ pub struct AskError {
 }
 
 impl AskError {
-    fn passing(sentence: String) -> Self {
+    pub fn passing(sentence: String) -> Self {
         Self {
             sentence,
             may_pass: true,
         }
     }
 
-    fn lasting(sentence: String) -> Self {
+    pub fn lasting(sentence: String) -> Self {
         Self {
             sentence,
             may_pass: false,
@@ -60,20 +61,28 @@ pub struct Sizes {
     pub limits: ScanLimits,
 }
 
+impl Sizes {
+    /// Returns the sizes of the scans of a radar; `place`, as in `at 192.168.0.1`, names it.
+    pub fn of(
+        configuration: &Configuration,
+        constants: DatasetOptions,
+        place: &str,
+    ) -> Result<Self, AskError> {
+        let assembler = SweepAssembler::new(configuration, constants).map_err(|error| {
+            AskError::lasting(format!("the radar {place} cannot be used: {error}"))
+        })?;
+        Ok(Self {
+            period_ns: configuration.period_ns(),
+            limits: assembler.limits(),
+        })
+    }
+}
+
 /// Asks a radar for its configuration. A radar that sends by UDP includes the configuration in each
 /// datagram.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
-    let configuration = configuration(settings)?;
-    match SweepAssembler::new(&configuration, settings.constants) {
-        Ok(assembler) => Ok(Sizes {
-            period_ns: configuration.period_ns(),
-            limits: assembler.limits(),
-        }),
-        Err(error) => Err(AskError::lasting(format!(
-            "the radar at {} cannot be used: {error}",
-            settings.address
-        ))),
-    }
+    let place = format!("at {}", settings.address);
+    Sizes::of(&configuration(settings)?, settings.constants, &place)
 }
 
 fn configuration(settings: &Settings) -> Result<Configuration, AskError> {

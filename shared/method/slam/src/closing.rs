@@ -3,6 +3,8 @@
 
 mod cache;
 
+use std::convert::Infallible;
+
 use gyre_estimation::places::{
     Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
     neighbours,

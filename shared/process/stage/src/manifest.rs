@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_messages::{Limits, Window};
+use gyre_messages::{Limits, Message, Refined, Window, topics};
 use serde::{Deserialize, Serialize};
 
 use crate::StageError;
@@ -37,6 +37,12 @@ impl Manifest {
         let path = Self::path(root);
         let text = fs::read_to_string(&path).map_err(|error| StageError::manifest(&path, error))?;
         serde_json::from_str(&text).map_err(|error| StageError::manifest(&path, error))
+    }
+
+    /// Returns whether the run has this topic.
+    pub fn has_topic(&self, name: &str) -> bool {
+        let is_known = topics(&self.window).any(|topic| topic.name == name);
+        is_known && (self.refines || name != Refined::TOPIC)
     }
 
     /// Returns the log where all processes append their events.

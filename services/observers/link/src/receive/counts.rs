@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeMap, fmt};
 
+use crate::send::is_lossless;
+
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Received {
     pub topics: BTreeMap<String, ReceivedCount>,
@@ -13,13 +15,12 @@ pub struct Received {
 pub struct ReceivedCount {
     pub received: u64,
     pub missed: u64,
-    pub is_lossless: bool,
 }
 
 impl Received {
     pub fn is_complete(&self) -> bool {
-        let mut topics = self.topics.values();
-        topics.all(|count| !count.is_lossless || count.missed == 0)
+        let mut topics = self.topics.iter();
+        topics.all(|(topic, count)| !is_lossless(topic) || count.missed == 0)
     }
 }
 

@@ -3,6 +3,7 @@
 use gyre_journal::Journal;
 use gyre_messages::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
 use gyre_stage::{
+    StageError,
     observer::Sequence,
     source::RecordedMessage,
     wake::{MAX_WAIT, Signals},
@@ -13,11 +14,10 @@ use zenoh::{Session, qos::Priority};
 
 use super::{ASK_FOR_RUN, Received, ReceivedCount, require_same};
 use crate::{
-    LinkError,
     connection_log::ConnectionLog,
+    error::other_version,
     fetch::{Fetcher, Request},
-    request::Answers,
-    send::{OfferedTopic, RunOffer, began_ns, offer_key, prefix},
+    send::{OfferedTopic, RunOffer, began_ns, is_lossless, offer_key, prefix},
     waker::Waker,
 };
 
@@ -26,8 +26,6 @@ pub(super) struct Mirror<'a> {
     pub link: String,
     pub receiver: String,
     pub offer: RunOffer,
-    /// The answers to the question for another sender, while nothing arrives.
-    pub answers: Option<Answers>,
     pub topics: Vec<MirroredTopic>,
     /// The poses that have arrived: they are not requested again.
     pub journal: Journal,
@@ -43,40 +41,37 @@ pub(super) struct MirroredTopic {
     pub fetcher: Fetcher,
     feed: TopicWriter,
     sequence: Sequence,
-    count: ReceivedCount,
+    received: u64,
 }
 
 impl Mirror<'_> {
-    pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, LinkError> {
-        let other_version = || LinkError::other_version(ASK_FOR_RUN.1);
-        let topic = topic(&offered.name).ok_or_else(other_version)?;
-        let from = match topic.name {
-            Pose::TOPIC => self.next_pose,
-            _ => 0,
-        };
+    pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, StageError> {
+        let topic = topic(&offered.name).ok_or_else(|| other_version(ASK_FOR_RUN.1))?;
+        let sequence = Sequence::default();
         Ok(MirroredTopic {
             name: topic.name,
             header_bytes: topic.header.bytes,
-            fetcher: self.fetch(topic.name, from, 0, offered.is_lossless),
+            fetcher: self.fetch(topic.name, &sequence),
             feed: self.rig.feed(topic.name)?,
-            sequence: Sequence::default(),
-            count: ReceivedCount {
-                is_lossless: offered.is_lossless,
-                ..ReceivedCount::default()
-            },
+            sequence,
+            received: 0,
         })
     }
 
-    /// Requests the messages of a topic from a number on, and messages of later generations than
-    /// this one.
-    fn fetch(&self, topic: &str, from: u64, generation: u32, is_lossless: bool) -> Fetcher {
+    /// Requests the messages of a topic behind those that are here, and messages of later
+    /// generations.
+    fn fetch(&self, topic: &str, here: &Sequence) -> Fetcher {
+        let from = match topic {
+            Pose::TOPIC => self.next_pose,
+            _ => here.next.unwrap_or_default(),
+        };
         let request = Request {
             key: format!("{}/{topic}", prefix(&self.link, &self.offer.sender)),
             from,
-            generation: Some(generation),
+            generation: Some(here.generation),
             receiver: self.receiver.clone(),
             // A scan takes long: poses go before it.
-            priority: match is_lossless {
+            priority: match is_lossless(topic) {
                 true => Priority::InteractiveHigh,
                 false => Priority::DataLow,
             },
@@ -85,38 +80,26 @@ impl Mirror<'_> {
     }
 
     /// Asks for another sender, and continues with it if it sends the same drive.
-    fn find_another_sender(&mut self) -> Result<(), LinkError> {
-        let Some(answers) = &self.answers else {
-            let key = offer_key(&self.link);
-            self.answers = Some(ASK_FOR_RUN.send(&self.session, key, [])?);
-            return Ok(());
-        };
-        let reply = match answers.try_recv() {
-            Ok(None) => return Ok(()),
-            Ok(reply) => reply,
-            Err(_) => None,
-        };
-        self.answers = None;
-        let offer = reply.map(|reply| ASK_FOR_RUN.parse(reply)).transpose()?;
-        match offer.flatten() {
+    fn find_another_sender(&mut self) -> Result<(), StageError> {
+        match ASK_FOR_RUN.ask(&self.session, offer_key(&self.link), [])? {
             Some(offer) => self.continue_with(offer),
             None => Ok(()),
         }
     }
 
-    fn continue_with(&mut self, other: RunOffer) -> Result<(), LinkError> {
+    fn continue_with(&mut self, other: RunOffer) -> Result<(), StageError> {
         if other.sender == self.offer.sender {
             return Ok(());
         }
         other.topics.iter().try_for_each(require_same)?;
         if !self.is_same_drive(&other)? {
-            return Err(LinkError::Refused(
+            return Err(StageError::Input(
                 "the sender plays a different drive now: what arrived of this drive is whole up to here; receive the new drive into a different folder".to_owned(),
             ));
         }
         let is_sent = |topic: &MirroredTopic| other.topics.iter().any(|it| it.name == topic.name);
         if let Some(topic) = self.topics.iter().find(|topic| !is_sent(topic)) {
-            return Err(LinkError::Refused(format!(
+            return Err(StageError::Input(format!(
                 "the sender has begun again and does not send `{}` any more: give it the same --topics",
                 topic.name
             )));
@@ -124,20 +107,14 @@ impl Mirror<'_> {
         self.offer = other;
         for place in 0..self.topics.len() {
             let topic = &self.topics[place];
-            if topic.fetcher.has_ended() {
-                continue;
+            if !topic.fetcher.has_ended() {
+                self.topics[place].fetcher = self.fetch(topic.name, &topic.sequence);
             }
-            let from = match topic.name {
-                Pose::TOPIC => self.next_pose,
-                _ => topic.sequence.next.unwrap_or_default(),
-            };
-            let (generation, is_lossless) = (topic.sequence.generation, topic.count.is_lossless);
-            self.topics[place].fetcher = self.fetch(topic.name, from, generation, is_lossless);
         }
         Ok(())
     }
 
-    fn is_same_drive(&self, other: &RunOffer) -> Result<bool, LinkError> {
+    fn is_same_drive(&self, other: &RunOffer) -> Result<bool, StageError> {
         let properties = |of: &RunOffer| (of.window, of.limits, of.live, of.refines);
         let began_ns = match self.next_pose {
             0 => self.offer.began_ns,
@@ -152,7 +129,7 @@ impl Mirror<'_> {
     }
 
     /// Publishes the messages that arrive until all topics have ended, or a signal arrives.
-    pub fn run(&mut self) -> Result<Received, LinkError> {
+    pub fn run(&mut self) -> Result<Received, StageError> {
         let mut connection = ConnectionLog::of("sender");
         let limits = self.rig.manifest().limits;
         loop {
@@ -176,9 +153,8 @@ impl Mirror<'_> {
                 |topic: &MirroredTopic| topic.fetcher.is_connected() && !topic.fetcher.has_ended();
             let is_connected = self.topics.iter().any(is_live);
             connection.update(is_connected, self.next_pose);
-            match is_connected {
-                true => self.answers = None,
-                false => self.find_another_sender()?,
+            if !is_connected {
+                self.find_another_sender()?;
             }
             for topic in &self.topics {
                 topic.feed.answer_handshakes()?;
@@ -195,8 +171,16 @@ impl Mirror<'_> {
     }
 
     fn received(&self, is_interrupted: bool) -> Received {
-        let topics = self.topics.iter();
-        let counts = topics.map(|topic| (topic.name.to_owned(), topic.count));
+        let counts = self.topics.iter().map(|topic| {
+            let missed = match topic.name {
+                // The numbers of corrections count the poses in them, and each replaces those
+                // before.
+                Correction::TOPIC => 0,
+                _ => topic.sequence.missed,
+            };
+            let received = topic.received;
+            (topic.name.to_owned(), ReceivedCount { received, missed })
+        });
         Received {
             is_interrupted,
             topics: counts.collect(),
@@ -205,18 +189,14 @@ impl Mirror<'_> {
 }
 
 impl MirroredTopic {
-    /// Returns the next message that has arrived, and counts those missed before it.
-    fn next_message(&mut self) -> Result<Option<RecordedMessage>, LinkError> {
+    /// Returns the next message that has arrived, and counts it.
+    fn next_message(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? else {
             return Ok(None);
         };
-        self.count.received += 1;
+        self.received += 1;
         if let Some(item) = message.item() {
             self.sequence.advance(&item);
-        }
-        // The numbers of corrections count the poses in them, and each replaces those before.
-        if self.name != Correction::TOPIC {
-            self.count.missed = self.sequence.missed;
         }
         Ok(Some(message))
     }
@@ -227,7 +207,7 @@ fn append(
     message: &RecordedMessage,
     next: u64,
     limits: &Limits,
-) -> Result<u64, LinkError> {
+) -> Result<u64, StageError> {
     let pose: Option<PoseHeader> = bytemuck::try_pod_read_unaligned(&message.header).ok();
     let is_new = |pose: &PoseHeader| {
         pose.item.seq == next && !pose.item.is(flag::END) && Pose::check(pose, &[], limits).is_ok()
@@ -235,6 +215,6 @@ fn append(
     let Some(pose) = pose.filter(is_new) else {
         return Ok(next);
     };
-    journal.append(&pose)?;
+    journal.append(&pose).map_err(StageError::input)?;
     Ok(next + 1)
 }

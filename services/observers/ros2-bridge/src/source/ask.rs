@@ -5,97 +5,55 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Configuration, SweepAssembler};
-use gyre_stages::live_radar::Sizes;
-use thiserror::Error;
+use gyre_colossus::Configuration;
+use gyre_stage::StageError;
+use gyre_stages::live_radar::{AskError, Sizes};
 
 use super::{Settings, configuration_estimate::ConfigurationEstimate, driver::Driver};
-use crate::NodeError;
 
-/// The longest wait for the configuration, which the driver repeats every four turns, and for
-/// azimuths to estimate it from.
+/// The longest wait for the configuration, which the driver repeats every four turns. Meanwhile
+/// azimuths come, to estimate it from.
 const MAX_WAIT: Duration = Duration::from_secs(6);
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-#[derive(Debug, Error)]
-#[error("{reason}")]
-pub struct AskError {
-    reason: String,
-    /// True of a driver that may still come, or whose radar may.
-    pub may_pass: bool,
-}
-
-impl AskError {
-    fn of(reason: String, may_pass: bool) -> Self {
-        Self { reason, may_pass }
-    }
-}
-
-impl From<NodeError> for AskError {
-    fn from(error: NodeError) -> Self {
-        Self::of(error.to_string(), false)
-    }
-}
-
 /// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
-    let mut driver = Driver::open(settings)?;
-    let configuration = match published(&driver, settings)? {
-        Some(configuration) => configuration,
-        None => estimated(&mut driver, settings)?,
-    };
-    let assembler = SweepAssembler::new(&configuration, settings.constants);
-    let assembler = assembler.map_err(|error| {
-        let reason = format!("the radar on {} cannot be used: {error}", settings.topic);
-        AskError::of(reason, false)
-    })?;
-    Ok(Sizes {
-        period_ns: configuration.period_ns(),
-        limits: assembler.limits(),
-    })
+    let place = format!("on {}", settings.topic);
+    Sizes::of(&configuration(settings)?, settings.constants, &place)
 }
 
-fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuration>, AskError> {
-    let started = Instant::now();
-    while started.elapsed() < MAX_WAIT {
-        driver.found()?;
-        if let Ok(Some(described)) = driver.configuration() {
-            return Ok(Some(described.radar));
-        }
-        sleep(POLL_INTERVAL);
-    }
-    if driver.found()?.is_some() {
-        return Ok(None);
-    }
-    let (topic, domain) = (&settings.topic, settings.domain.id());
-    let reason = format!(
-        "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
-    );
-    Err(AskError::of(reason, true))
-}
-
-fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, AskError> {
-    let Some(resolution_m) = settings.constants.range_resolution_m else {
-        let topic = settings.configuration_topic();
-        let reason = format!(
-            "the driver publishes no {topic}, and nothing else gives the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
-        );
-        return Err(AskError::of(reason, false));
-    };
+/// Returns the configuration that the driver publishes, or the one that its azimuths show.
+fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
+    let lasting = |error: StageError| AskError::lasting(error.to_string());
+    let mut driver = Driver::open(settings).map_err(lasting)?;
     let (mut estimate, started) = (ConfigurationEstimate::default(), Instant::now());
     while started.elapsed() < MAX_WAIT {
-        driver.receive()?;
+        driver.receive().map_err(lasting)?;
+        if let Ok(Some(described)) = driver.configuration() {
+            return Ok(described.radar);
+        }
         while let Ok(Some(packet)) = driver.packet() {
             estimate.add_message(&packet.message, packet.message.arrival_ns());
         }
-        if let Some(found) = estimate.configuration(settings.encoder_counts, resolution_m) {
-            return Ok(found);
-        }
         sleep(POLL_INTERVAL);
     }
-    let reason = format!(
-        "the driver publishes {}, but no azimuth arrives: check that the radar is on and in reach of its driver",
-        settings.topic
-    );
-    Err(AskError::of(reason, true))
+    let topic = &settings.topic;
+    if driver.found().map_err(lasting)?.is_none() {
+        let domain = settings.domain.id();
+        return Err(AskError::passing(format!(
+            "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
+        )));
+    }
+    let Some(resolution_m) = settings.constants.range_resolution_m else {
+        let topic = settings.configuration_topic();
+        return Err(AskError::lasting(format!(
+            "the driver publishes no {topic}, and nothing else gives the depth of a range bin: set dataset.range_resolution_m, and dataset.encoder_counts unless it is 5600"
+        )));
+    };
+    let found = estimate.configuration(settings.encoder_counts, resolution_m);
+    found.ok_or_else(|| {
+        AskError::passing(format!(
+            "the driver publishes {topic}, but no azimuth arrives: check that the radar is on and in reach of its driver"
+        ))
+    })
 }

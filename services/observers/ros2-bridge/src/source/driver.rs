@@ -1,6 +1,6 @@
 //! The topics of Navtech's driver.
 
-use std::{io, os::fd::BorrowedFd};
+use std::os::fd::BorrowedFd;
 
 use gyre_colossus::{Azimuth, Configuration};
 use gyre_ros2_messages::{
@@ -12,11 +12,11 @@ use gyre_ros2_messages::{
     std_msgs::Header,
 };
 use gyre_samples::Sample;
-use gyre_stage::clock;
+use gyre_stage::{StageError, clock};
 use ros2_client::{Gid, ReadError, Subscription};
 
 use super::{Settings, fixes::Fixes, wakeups::Wakeups};
-use crate::{NodeError, node::Node};
+use crate::node::Node;
 
 const NODE: &str = "gyre_source";
 /// Azimuths that are kept until they are taken: ten turns. The driver keeps one turn.
@@ -73,11 +73,8 @@ impl PacketMessage {
     }
 }
 
-enum Azimuths {
-    Azimuth(Subscription<RadarFftDataMsg>),
-    Bytes(Subscription<RadarFftDataMessage>),
-    Turn(Subscription<RadarBScanMsg>),
-}
+/// Takes the next message of the azimuths' topic, whatever its type.
+type TakePacket = Box<dyn Fn() -> Result<Option<Packet>, ReadError>>;
 
 pub struct Driver {
     node: Node,
@@ -87,7 +84,7 @@ pub struct Driver {
     configuration_dds_name: String,
     configurations: Subscription<RadarConfigurationMsg>,
     older: Subscription<RadarConfigurationMessage>,
-    azimuths: Option<Azimuths>,
+    azimuths: Option<TakePacket>,
     /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
     pub sample_wakeups: Wakeups,
     gyro: Option<Subscription<Imu>>,
@@ -103,7 +100,7 @@ pub struct DescribedRadar {
 }
 
 impl Driver {
-    pub fn open(settings: &Settings) -> Result<Self, NodeError> {
+    pub fn open(settings: &Settings) -> Result<Self, StageError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
@@ -131,11 +128,11 @@ impl Driver {
     }
 
     /// Returns the type of the azimuths' topic on DDS; `None` while there is no publisher.
-    pub fn found(&self) -> Result<Option<String>, NodeError> {
+    pub fn found(&self) -> Result<Option<String>, StageError> {
         match self.node.type_of(&self.dds_name) {
             Some(found) if !names().contains(&found) => {
                 let (topic, names) = (&self.topic, names().join(", "));
-                Err(NodeError(format!(
+                Err(StageError::Input(format!(
                     "{topic} carries {found}, but Gyre reads {names}"
                 )))
             }
@@ -144,7 +141,7 @@ impl Driver {
     }
 
     /// Subscribes to the azimuths once there is a publisher; returns whether there is one.
-    pub fn receive(&mut self) -> Result<bool, NodeError> {
+    pub fn receive(&mut self) -> Result<bool, StageError> {
         if self.azimuths.is_some() {
             return Ok(true);
         }
@@ -154,11 +151,14 @@ impl Driver {
         let [azimuth, turn, _] = names();
         let (node, wakeups, topic) = (&mut self.node, &mut self.wakeups, &self.topic);
         self.azimuths = Some(if found == azimuth {
-            Azimuths::Azimuth(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
+            let topic = subscribe(node, wakeups, topic, AZIMUTHS, false)?;
+            take(topic, PacketMessage::Azimuth)
         } else if found == turn {
-            Azimuths::Turn(subscribe(node, wakeups, topic, TURNS, false)?)
+            let topic = subscribe(node, wakeups, topic, TURNS, false)?;
+            take(topic, PacketMessage::Turn)
         } else {
-            Azimuths::Bytes(subscribe(node, wakeups, topic, AZIMUTHS, false)?)
+            let topic = subscribe(node, wakeups, topic, AZIMUTHS, false)?;
+            take(topic, PacketMessage::Bytes)
         });
         Ok(true)
     }
@@ -167,7 +167,7 @@ impl Driver {
         self.wakeups.descriptor()
     }
 
-    pub fn clear(&mut self) -> io::Result<()> {
+    pub fn clear(&mut self) -> Result<(), StageError> {
         self.wakeups.clear()
     }
 
@@ -221,12 +221,7 @@ impl Driver {
     }
 
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
-        Ok(match &self.azimuths {
-            Some(Azimuths::Azimuth(topic)) => take(topic, PacketMessage::Azimuth)?,
-            Some(Azimuths::Bytes(topic)) => take(topic, PacketMessage::Bytes)?,
-            Some(Azimuths::Turn(topic)) => take(topic, PacketMessage::Turn)?,
-            None => None,
-        })
+        self.azimuths.as_ref().map_or(Ok(None), |take| take())
     }
 }
 
@@ -236,19 +231,21 @@ fn subscribe<M: Ros2Message + Send + 'static>(
     topic: &str,
     depth: usize,
     is_lossy: bool,
-) -> Result<Subscription<M>, NodeError> {
+) -> Result<Subscription<M>, StageError> {
     let mut subscription = node.subscribe(topic, depth, is_lossy)?;
     wakeups.add(&mut subscription)?;
     Ok(subscription)
 }
 
 fn take<M: Ros2Message + 'static>(
-    topic: &Subscription<M>,
+    topic: Subscription<M>,
     of: fn(M) -> PacketMessage,
-) -> Result<Option<Packet>, ReadError> {
-    let taken = topic.take()?;
-    Ok(taken.map(|(message, info)| Packet {
-        message: of(message),
-        publisher: info.publisher_gid(),
-    }))
+) -> TakePacket {
+    Box::new(move || {
+        let taken = topic.take()?;
+        Ok(taken.map(|(message, info)| Packet {
+            message: of(message),
+            publisher: info.publisher_gid(),
+        }))
+    })
 }

@@ -4,11 +4,11 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
-use gyre_stage::clock;
+use gyre_stage::{StageError, clock};
 use ros2_client::Subscription;
 
 use super::wakeups::Wakeups;
-use crate::{NodeError, node::Node};
+use crate::node::Node;
 
 /// Fixes that are kept: ten seconds of 20 a second.
 const FIXES: usize = 200;
@@ -34,16 +34,16 @@ impl Fixes {
         node: &mut Node,
         wakeups: &mut Wakeups,
         settings: &FixSettings,
-    ) -> Result<Self, NodeError> {
+    ) -> Result<Self, StageError> {
         let failed = |error: io::Error| {
             let listen = &settings.listen;
-            NodeError(format!(
+            StageError::Input(format!(
                 "cannot pass the fixes of GNSS on to {listen} (gnss.listen): {error}"
             ))
         };
         let (socket, listen) = socket_to(&settings.listen).map_err(failed)?;
         let mut topic = node.subscribe(&settings.topic, FIXES, true)?;
-        wakeups.add(&mut topic).map_err(failed)?;
+        wakeups.add(&mut topic)?;
         Ok(Self {
             topic,
             socket,

@@ -21,7 +21,6 @@ use super::{
     configuration_estimate::ConfigurationEstimate,
     driver::{DescribedRadar, Driver, Packet, PacketMessage},
 };
-use crate::NodeError;
 
 const MAX_MESSAGES: usize = 512;
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
@@ -40,17 +39,15 @@ pub struct Radar {
     opened: Instant,
     /// A turn, and how many of its rows were added: a scan can be complete before its end.
     turn: Option<(RadarBScanMsg, usize)>,
-    /// Who publishes the azimuths, and how often that has changed.
+    /// Who publishes the azimuths, and the number of publishers so far.
     publisher: Option<Gid>,
-    changes: u64,
-    /// The counts of the source process before this one, if it died.
-    before: Received,
+    publishers: u64,
     last_azimuth: Instant,
     is_silent: bool,
 }
 
 impl Radar {
-    pub fn open(settings: Settings) -> Result<Self, NodeError> {
+    pub fn open(settings: Settings) -> Result<Self, StageError> {
         let now = Instant::now();
         Ok(Self {
             intake: Intake::new(settings.constants),
@@ -61,8 +58,7 @@ impl Radar {
             opened: now,
             turn: None,
             publisher: None,
-            changes: 0,
-            before: Received::default(),
+            publishers: 0,
             last_azimuth: now,
             is_silent: false,
         })
@@ -156,9 +152,9 @@ impl Radar {
                 self.intake.damaged(reason, 0);
                 return Ok(false);
             }
-            before => {
+            _ => {
                 self.publisher = Some(publisher);
-                self.changes += u64::from(before.is_some());
+                self.publishers += 1;
                 self.intake.restart();
                 if let Some(described) = self.described {
                     self.configure(described, room)?;
@@ -228,9 +224,8 @@ impl Sensor for Radar {
     }
 
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
-        let input = |error: NodeError| StageError::Input(error.to_string());
-        let is_received = self.driver.receive().map_err(input)?;
-        self.driver.clear().map_err(|error| input(error.into()))?;
+        let is_received = self.driver.receive()?;
+        self.driver.clear()?;
         self.driver.pass_fixes_on();
         self.take_configuration(bytes.len())?;
         if let Some((turn, rows)) = self.turn.take()
@@ -274,16 +269,12 @@ impl Sensor for Radar {
 
     fn resume(&mut self, before: Received) {
         self.intake.resume(before);
-        self.before = before;
     }
 
     fn received(&self) -> Received {
-        Received {
-            connections: self.before.connections
-                + u64::from(self.publisher.is_some())
-                + self.changes,
-            is_receiving: self.publisher.is_some() && !self.is_silent,
-            ..self.intake.received()
-        }
+        let mut counts = self.intake.received();
+        counts.connections += self.publishers;
+        counts.is_receiving = self.publisher.is_some() && !self.is_silent;
+        counts
     }
 }

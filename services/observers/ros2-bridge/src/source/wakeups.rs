@@ -6,6 +6,7 @@ use std::{
     time::Duration,
 };
 
+use gyre_stage::StageError;
 use ros2_client::{
     Subscription,
     dds::rustdds::mio1::{Events, Interest, Poll, Token, event::Source},
@@ -21,15 +22,15 @@ pub struct Wakeups {
 }
 
 impl Wakeups {
-    pub fn new() -> io::Result<Self> {
+    pub fn new() -> Result<Self, StageError> {
         Ok(Self {
-            poll: Poll::new()?,
+            poll: Poll::new().map_err(failed)?,
             events: Events::with_capacity(CAPACITY),
             topics: 0,
         })
     }
 
-    pub fn add<M>(&mut self, topic: &mut Subscription<M>) -> io::Result<()>
+    pub fn add<M>(&mut self, topic: &mut Subscription<M>) -> Result<(), StageError>
     where
         Subscription<M>: Source,
     {
@@ -38,6 +39,7 @@ impl Wakeups {
         self.poll
             .registry()
             .register(topic, token, Interest::READABLE)
+            .map_err(failed)
     }
 
     pub fn descriptor(&self) -> BorrowedFd<'_> {
@@ -45,10 +47,14 @@ impl Wakeups {
     }
 
     /// Makes it unreadable until the next message. Take all messages after this, and not before.
-    pub fn clear(&mut self) -> io::Result<()> {
+    pub fn clear(&mut self) -> Result<(), StageError> {
         match self.poll.poll(&mut self.events, Some(Duration::ZERO)) {
-            Err(error) if error.kind() != io::ErrorKind::Interrupted => Err(error),
+            Err(error) if error.kind() != io::ErrorKind::Interrupted => Err(failed(error)),
             _ => Ok(()),
         }
     }
+}
+
+fn failed(error: io::Error) -> StageError {
+    StageError::Input(format!("cannot wait for topics of ROS 2: {error}"))
 }

@@ -44,16 +44,16 @@ fn with_server(limits: Limits, test: impl AsyncFnOnce(SocketAddr)) {
     });
 }
 
-fn limits(request: Duration, answer: Duration) -> Limits {
+fn limits(request: Duration, answers: Duration) -> Limits {
     Limits {
         connections: 4,
         request,
-        answer,
+        answers,
     }
 }
 
 const LONG: Duration = Duration::from_secs(60);
-const SHORT: Duration = Duration::from_secs(2);
+const SHORT: Duration = Duration::from_secs(1);
 
 async fn answer(address: SocketAddr) -> Vec<u8> {
     let mut stream = TcpStream::connect(address).await.unwrap();

@@ -1,7 +1,7 @@
 //! The channels that viewers can subscribe to.
 
 use base64::{Engine, prelude::BASE64_STANDARD};
-use gyre_messages::{Message, Pose, Refined, topics};
+use gyre_messages::{Message, Pose};
 use gyre_recording::view::{CHANNELS, POINTS, TRAJECTORY};
 use gyre_stage::Manifest;
 use serde_json::{Value, json};
@@ -20,10 +20,7 @@ pub struct Channel {
 
 impl Channel {
     pub fn is_of(&self, manifest: &Manifest) -> bool {
-        self.topic.is_none_or(|name| {
-            let has = topics(&manifest.window).any(|topic| topic.name == name);
-            has && (manifest.refines || name != Refined::TOPIC)
-        })
+        self.topic.is_none_or(|name| manifest.has_topic(name))
     }
 
     fn measured(name: &'static str, topic: Option<&'static str>, schema: &Value) -> Self {

@@ -22,7 +22,10 @@ use super::{
     Hub,
     measurements::{HEALTH, LATENCY, latency},
 };
-use crate::observing::{Followed, follow_topic};
+use crate::{
+    observing::{Followed, follow_topic},
+    run_view::RunView,
+};
 
 /// Time between two polls for the log and the report, and for a request to stop.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
@@ -30,13 +33,6 @@ const POLL_INTERVAL: Duration = Duration::from_millis(200);
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
 
 const TRAJECTORY_INTERVAL: Duration = Duration::from_secs(1);
-
-struct Publisher {
-    hub: Arc<Hub>,
-    followed: Arc<Followed>,
-    /// When the last picture or trajectory was made.
-    drawn: Option<Instant>,
-}
 
 pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHandle<()>>> {
     let report = {
@@ -46,42 +42,44 @@ pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHan
     };
     Ok(vec![
         report,
-        follow::<Scan>(followed, hub, Publisher::scan)?,
-        follow::<Masked>(followed, hub, Publisher::masked)?,
-        follow::<Rotation>(followed, hub, |_, _| {})?,
-        follow::<Motion>(followed, hub, |_, _| {})?,
-        follow::<Refined>(followed, hub, |_, _| {})?,
-        follow::<Pose>(followed, hub, Publisher::pose)?,
-        follow::<Loop>(followed, hub, |_, _| {})?,
-        follow::<Correction>(followed, hub, |_, _| {})?,
-        follow::<Fix>(followed, hub, |_, _| {})?,
-        follow::<Objects>(followed, hub, |_, _| {})?,
+        follow::<Scan>(followed, hub, PICTURE_INTERVAL, scan)?,
+        follow::<Masked>(followed, hub, PICTURE_INTERVAL, masked)?,
+        follow::<Rotation>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
+        follow::<Motion>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
+        follow::<Refined>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
+        follow::<Pose>(followed, hub, TRAJECTORY_INTERVAL, trajectory)?,
+        follow::<Loop>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
+        follow::<Correction>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
+        follow::<Fix>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
+        follow::<Objects>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
     ])
 }
 
-/// Follows a topic; `more` publishes the views that need the payload.
+/// Follows a topic; `draw` publishes the views that take long, at most once in an interval.
 fn follow<M: Message>(
     followed: &Arc<Followed>,
     hub: &Arc<Hub>,
-    more: fn(&mut Publisher, &Received<M>),
+    interval: Duration,
+    draw: fn(&Hub, &RunView, &Received<M>),
 ) -> io::Result<JoinHandle<()>> {
     let (hub, followed) = (Arc::clone(hub), Arc::clone(followed));
     let thread = thread::Builder::new().name(format!("fox-{}", M::TOPIC));
     thread.spawn(move || {
         let is_wanted = || !followed.view.is_stopping() && hub.wants_topic(M::TOPIC);
+        let mut drawn: Option<Instant> = None;
         while !followed.view.is_stopping() {
-            let mut publisher = Publisher {
-                hub: Arc::clone(&hub),
-                followed: Arc::clone(&followed),
-                drawn: None,
-            };
             let published = follow_topic::<M>(&followed, &is_wanted, |message, _| {
-                let Some(message) = message else { return };
-                let stamp_ns = message.item().stamp_ns;
+                let item = message.item();
                 for view in views(M::TOPIC, bytes_of(message.header())) {
-                    hub.publish(view.channel, stamp_ns, view.data);
+                    hub.publish(view.channel, item.stamp_ns, view.data);
                 }
-                more(&mut publisher, message);
+                if M::TOPIC == Pose::TOPIC && hub.is_wanted(LATENCY) {
+                    hub.publish(LATENCY, item.stamp_ns, latency(item));
+                }
+                if drawn.is_none_or(|drawn| drawn.elapsed() >= interval) {
+                    drawn = Some(Instant::now());
+                    draw(&hub, &followed.view, message);
+                }
             });
             if let Err(error) = published {
                 let notice = format!("{} is not shown: {error}.", M::TOPIC);
@@ -91,60 +89,36 @@ fn follow<M: Message>(
     })
 }
 
-impl Publisher {
-    /// Publishes a view if it is wanted. A message that is too short for its header has none.
-    fn publish(&self, channel: &str, stamp_ns: i64, view: impl FnOnce() -> Option<View>) {
-        if self.hub.is_wanted(channel)
-            && let Some(view) = view()
-        {
-            self.hub.publish(channel, stamp_ns, view.data);
-        }
-    }
+fn scan(hub: &Hub, _: &RunView, message: &Received<Scan>) {
+    image(hub, "/scan", message);
+}
 
-    fn is_due(&mut self, interval: Duration) -> bool {
-        let is_due = self.drawn.is_none_or(|drawn| drawn.elapsed() >= interval);
-        if is_due {
-            self.drawn = Some(Instant::now());
-        }
-        is_due
+fn masked(hub: &Hub, _: &RunView, message: &Received<Masked>) {
+    image(hub, "/masked", message);
+    let header = message.header();
+    if hub.is_wanted(POINTS)
+        && let Some(points) = header.points(message.values())
+    {
+        let view = View::points(points, header);
+        hub.publish(POINTS, header.item.stamp_ns, view.data);
     }
+}
 
-    fn scan(&mut self, message: &Received<Scan>) {
-        if self.is_due(PICTURE_INTERVAL) {
-            self.image("/scan", message);
-        }
+/// Publishes the image of a message. One that is too short for its header has none.
+fn image<M: Message>(hub: &Hub, channel: &str, message: &Received<M>) {
+    let (header, stamp_ns) = (bytes_of(message.header()), message.item().stamp_ns);
+    if hub.is_wanted(channel)
+        && let Some(view) = View::image_of(M::TOPIC, header, message.values(), stamp_ns)
+    {
+        hub.publish(channel, stamp_ns, view.data);
     }
+}
 
-    fn masked(&mut self, message: &Received<Masked>) {
-        if !self.is_due(PICTURE_INTERVAL) {
-            return;
-        }
-        self.image("/masked", message);
-        let header = message.header();
-        self.publish(POINTS, header.item.stamp_ns, || {
-            let points = header.points(message.values())?;
-            Some(View::points(points, header))
-        });
-    }
-
-    fn image<M: Message>(&self, channel: &str, message: &Received<M>) {
+fn trajectory(hub: &Hub, view: &RunView, message: &Received<Pose>) {
+    if hub.is_wanted(TRAJECTORY) {
         let stamp_ns = message.item().stamp_ns;
-        self.publish(channel, stamp_ns, || {
-            let header = bytes_of(message.header());
-            View::image_of(M::TOPIC, header, message.values(), stamp_ns)
-        });
-    }
-
-    fn pose(&mut self, message: &Received<Pose>) {
-        let item = message.item();
-        if self.hub.is_wanted(LATENCY) {
-            self.hub.publish(LATENCY, item.stamp_ns, latency(item));
-        }
-        if self.hub.is_wanted(TRAJECTORY) && self.is_due(TRAJECTORY_INTERVAL) {
-            let poses = self.followed.view.trajectory().into_iter();
-            let view = View::trajectory(poses, item.stamp_ns);
-            self.hub.publish(TRAJECTORY, item.stamp_ns, view.data);
-        }
+        let view = View::trajectory(view.trajectory().into_iter(), stamp_ns);
+        hub.publish(TRAJECTORY, stamp_ns, view.data);
     }
 }
 

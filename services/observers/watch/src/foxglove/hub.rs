@@ -1,56 +1,77 @@
 //! Between the threads that observe the run and the viewers.
 
-use std::sync::{
-    Arc, Mutex, MutexGuard, PoisonError,
-    atomic::{AtomicUsize, Ordering},
+use std::{collections::VecDeque, sync::Arc};
+
+use axum::body::Bytes;
+use tokio::sync::{
+    broadcast::{self, error::TryRecvError},
+    watch,
 };
 
-use tokio::sync::watch;
+use super::channels::{self, Channel};
 
-use super::{
-    channels::{self, Channel},
-    viewer_queue::{EncodedMessage, ViewerQueue},
-};
+/// The most messages of a channel that wait for a viewer: a minute of poses. Of pictures only the
+/// newest waits.
+const DEPTH: usize = 256;
 
 pub struct Hub {
     pub channels: Vec<Channel>,
     pub of_run: watch::Sender<Vec<usize>>,
     /// The newest sentence about a topic that is not shown.
     pub notice: watch::Sender<String>,
-    wanted: Vec<AtomicUsize>,
-    viewers: Mutex<Vec<Arc<ViewerQueue>>>,
+    messages: Vec<broadcast::Sender<EncodedMessage>>,
+    /// Changes with each message.
+    published: watch::Sender<()>,
 }
 
-/// A viewer in the hub. Dropped, it is removed with its subscriptions.
-pub struct HubMember {
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncodedMessage {
+    /// Time of the scan on the sensor's clock, ns.
+    pub stamp_ns: i64,
+    pub data: Bytes,
+}
+
+/// The subscriptions of a viewer.
+pub struct Subscriptions {
     hub: Arc<Hub>,
-    pub queue: Arc<ViewerQueue>,
+    published: watch::Receiver<()>,
+    /// The one that was read last is the last.
+    all: VecDeque<Subscription>,
+    /// Messages that this viewer was too slow for.
+    pub skipped: u64,
+}
+
+struct Subscription {
+    channel: usize,
+    /// The viewer's number.
+    id: u32,
+    messages: broadcast::Receiver<EncodedMessage>,
 }
 
 impl Default for Hub {
     fn default() -> Self {
         let channels = channels::all();
+        let messages = channels.iter().map(|channel| {
+            let depth = if channel.is_bulky { 1 } else { DEPTH };
+            broadcast::Sender::new(depth)
+        });
         Self {
-            wanted: channels.iter().map(|_| AtomicUsize::new(0)).collect(),
+            messages: messages.collect(),
             channels,
             of_run: watch::Sender::default(),
             notice: watch::Sender::default(),
-            viewers: Mutex::default(),
+            published: watch::Sender::default(),
         }
     }
 }
 
 impl Hub {
-    fn viewers(&self) -> MutexGuard<'_, Vec<Arc<ViewerQueue>>> {
-        self.viewers.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn position(&self, name: &str) -> Option<usize> {
         self.channels.iter().position(|it| it.name == name)
     }
 
     pub fn is_wanted(&self, name: &str) -> bool {
-        let has = |channel: usize| self.wanted[channel].load(Ordering::Relaxed) > 0;
+        let has = |channel: usize| self.messages[channel].receiver_count() > 0;
         self.position(name).is_some_and(has)
     }
 
@@ -63,73 +84,121 @@ impl Hub {
         let Some(channel) = self.position(name) else {
             return;
         };
-        let message = EncodedMessage {
-            channel,
-            is_bulky: self.channels[channel].is_bulky,
-            stamp_ns,
-            data: data.into(),
-        };
-        self.viewers().iter().for_each(|it| it.put(&message));
-    }
-
-    pub fn join(self: &Arc<Self>) -> HubMember {
-        let queue = Arc::new(ViewerQueue::default());
-        self.viewers().push(Arc::clone(&queue));
-        HubMember {
-            hub: Arc::clone(self),
-            queue,
-        }
+        let data = data.into();
+        // Without a viewer nobody receives it.
+        let _ = self.messages[channel].send(EncodedMessage { stamp_ns, data });
+        self.published.send_replace(());
     }
 }
 
-impl HubMember {
-    /// Subscribes to a channel; false if the number is unknown.
-    pub fn subscribe(&self, channel: usize, subscription: u32) -> bool {
-        let Some(wanted) = self.hub.wanted.get(channel) else {
+impl Subscriptions {
+    pub fn of(hub: Arc<Hub>) -> Self {
+        Self {
+            published: hub.published.subscribe(),
+            hub,
+            all: VecDeque::new(),
+            skipped: 0,
+        }
+    }
+
+    /// Subscribes to a channel, or changes its number; false if there is no such channel.
+    pub fn add(&mut self, channel: usize, id: u32) -> bool {
+        let Some(messages) = self.hub.messages.get(channel) else {
             return false;
         };
-        if self.queue.subscribe(channel, subscription) {
-            wanted.fetch_add(1, Ordering::Relaxed);
-        }
+        let messages = messages.subscribe();
+        self.all.retain(|it| it.channel != channel);
+        self.all.push_back(Subscription {
+            channel,
+            id,
+            messages,
+        });
         true
     }
 
     /// Ends a subscription; one that there is not has ended already.
-    pub fn unsubscribe(&self, subscription: u32) {
-        if let Some(channel) = self.queue.unsubscribe(subscription) {
-            self.hub.wanted[channel].fetch_sub(1, Ordering::Relaxed);
+    pub fn remove(&mut self, id: u32) {
+        self.all.retain(|it| it.id != id);
+    }
+
+    /// Waits for the next message, and returns it with the viewer's number of its subscription.
+    pub async fn next(&mut self) -> (u32, EncodedMessage) {
+        loop {
+            if let Some(next) = self.take() {
+                return next;
+            }
+            // The hub is not dropped before its viewers.
+            let _ = self.published.changed().await;
         }
     }
-}
 
-impl Drop for HubMember {
-    fn drop(&mut self) {
-        for channel in self.queue.subscribed() {
-            self.hub.wanted[channel].fetch_sub(1, Ordering::Relaxed);
+    /// Takes a message that waits, of each channel in turn.
+    fn take(&mut self) -> Option<(u32, EncodedMessage)> {
+        for _ in 0..self.all.len() {
+            self.all.rotate_left(1);
+            let subscription = self.all.back_mut()?;
+            loop {
+                match subscription.messages.try_recv() {
+                    Ok(message) => return Some((subscription.id, message)),
+                    Err(TryRecvError::Lagged(skipped)) => self.skipped += skipped,
+                    Err(_) => break,
+                }
+            }
         }
-        let is_other = |other: &Arc<ViewerQueue>| !Arc::ptr_eq(other, &self.queue);
-        self.hub.viewers().retain(is_other);
+        None
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::iter;
+
     use super::*;
+
+    fn id(hub: &Hub, name: &str) -> usize {
+        hub.position(name).unwrap_or(usize::MAX)
+    }
 
     #[test]
     fn a_topic_is_wanted_as_long_as_a_viewer_has_subscribed_to_one_of_its_channels() {
         let hub = Arc::new(Hub::default());
-        let id = |name| hub.position(name).unwrap_or(usize::MAX);
-        let (first, second) = (hub.join(), hub.join());
-        assert!(first.subscribe(id("/tf"), 1) && second.subscribe(id("/points"), 1));
-        assert!(first.subscribe(id("/tf"), 2));
-        assert!(!first.subscribe(hub.channels.len(), 3));
+        let [mut first, mut second] = [(); 2].map(|()| Subscriptions::of(Arc::clone(&hub)));
+        assert!(first.add(id(&hub, "/tf"), 1) && second.add(id(&hub, "/points"), 1));
+        assert!(first.add(id(&hub, "/tf"), 2));
+        assert!(!first.add(hub.channels.len(), 3));
         let wanted = || ["pose", "masked", "scan"].map(|topic| hub.wants_topic(topic));
         assert_eq!(wanted(), [true, true, false]);
-        first.unsubscribe(2);
+        first.remove(1);
+        assert_eq!(wanted(), [true, true, false]);
+        first.remove(2);
         assert_eq!(wanted(), [false, true, false]);
         drop(second);
         assert_eq!(wanted(), [false; 3]);
-        assert_eq!(hub.viewers().len(), 1);
+    }
+
+    #[test]
+    fn of_pictures_the_newest_waits_and_of_all_else_the_last_ones() {
+        let hub = Arc::new(Hub::default());
+        let mut viewer = Subscriptions::of(Arc::clone(&hub));
+        assert!(viewer.add(id(&hub, "/scan"), 70) && viewer.add(id(&hub, "/pose"), 71));
+        for bytes in 1..=5 {
+            for name in ["/scan", "/pose", "/tf"] {
+                hub.publish(name, 0, vec![0; bytes]);
+            }
+        }
+        let taken = iter::from_fn(|| viewer.take());
+        let taken: Vec<_> = taken.map(|(id, it)| (id, it.data.len())).collect();
+        assert_eq!(
+            taken,
+            [(70, 5), (71, 1), (71, 2), (71, 3), (71, 4), (71, 5)]
+        );
+        assert_eq!(viewer.skipped, 4);
+        (0..1000).for_each(|stamp_ns| hub.publish("/pose", stamp_ns, Vec::new()));
+        let waiting = iter::from_fn(|| viewer.take()).count() as u64;
+        assert!(waiting <= DEPTH as u64);
+        assert_eq!(viewer.skipped, 4 + 1000 - waiting);
+        hub.publish("/pose", 0, Vec::new());
+        viewer.remove(71);
+        assert_eq!(viewer.take(), None);
     }
 }

@@ -8,7 +8,10 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::time::{self, Instant};
 
-use super::{Hub, hub::HubMember, viewer_queue::EncodedMessage};
+use super::{
+    Hub,
+    hub::{EncodedMessage, Subscriptions},
+};
 use crate::run_view::RunView;
 
 pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -46,25 +49,25 @@ struct Subscription {
 struct Viewer {
     socket: WebSocket,
     hub: Arc<Hub>,
-    member: HubMember,
+    subscriptions: Subscriptions,
     advertised: Vec<usize>,
     /// The viewer's clock: the newest time of the sensor that it was sent, ns.
     time_ns: i64,
-    skipped: u64,
+    /// The skipped messages that the viewer knows of.
+    reported: u64,
     last_warning: Option<Instant>,
 }
 
 struct Disconnected;
 
 pub async fn serve(socket: WebSocket, hub: Arc<Hub>, view: Arc<RunView>) {
-    let member = hub.join();
     let mut viewer = Viewer {
         socket,
+        subscriptions: Subscriptions::of(Arc::clone(&hub)),
         hub,
-        member,
         advertised: Vec::new(),
         time_ns: 0,
-        skipped: 0,
+        reported: 0,
         last_warning: None,
     };
     // Nothing more can be sent.
@@ -78,7 +81,6 @@ impl Viewer {
         of_run.mark_changed();
         let mut run = view.run().id;
         self.send_json(&server_info()).await?;
-        let queue = Arc::clone(&self.member.queue);
         loop {
             tokio::select! {
                 biased;
@@ -96,7 +98,7 @@ impl Viewer {
                     let sentence = notice.borrow_and_update().clone();
                     self.send_status(WARNING, "run", &sentence).await?;
                 }
-                (subscription, message) = queue.next() => {
+                (subscription, message) = self.subscriptions.next() => {
                     let current = view.run().id;
                     if current != run {
                         // Another run: its sensor's time may be earlier.
@@ -112,7 +114,7 @@ impl Viewer {
         match serde_json::from_str(text) {
             Ok(Request::Subscribe { subscriptions }) => {
                 for Subscription { id, channel_id } in subscriptions {
-                    if !self.member.subscribe(channel_id, id) {
+                    if !self.subscriptions.add(channel_id, id) {
                         let sentence = format!("There is no channel {channel_id}.");
                         self.send_status(ERROR, "request", &sentence).await?;
                     }
@@ -121,7 +123,7 @@ impl Viewer {
             }
             Ok(Request::Unsubscribe { subscription_ids }) => {
                 let ids = subscription_ids.into_iter();
-                ids.for_each(|id| self.member.unsubscribe(id));
+                ids.for_each(|id| self.subscriptions.remove(id));
                 Ok(())
             }
             Ok(Request::Other) => Ok(()),
@@ -175,18 +177,13 @@ impl Viewer {
 
     async fn warn_of_skipped(&mut self) -> Result<(), Disconnected> {
         let is_recent = |at: Instant| at.elapsed() < SENTENCE_PERIOD;
-        if self.last_warning.is_some_and(is_recent) {
+        let skipped = self.subscriptions.skipped;
+        if skipped == self.reported || self.last_warning.is_some_and(is_recent) {
             return Ok(());
         }
-        let skipped = self.member.queue.skipped();
-        if skipped == 0 {
-            return Ok(());
-        }
-        self.skipped += skipped;
-        self.last_warning = Some(Instant::now());
+        (self.reported, self.last_warning) = (skipped, Some(Instant::now()));
         let sentence = format!(
-            "{} messages were skipped so far: this connection is slower than the run.",
-            self.skipped
+            "{skipped} messages were skipped so far: this connection is slower than the run."
         );
         self.send_status(WARNING, "skipped", &sentence).await
     }
