@@ -51,8 +51,7 @@ impl From<LinkError> for StageError {
     fn from(error: LinkError) -> Self {
         match error {
             LinkError::Stage(error) => error,
-            LinkError::Zenoh { action, reason } => Self::Transport { action, reason },
-            LinkError::Network(_) => Self::Configuration(error.to_string()),
+            LinkError::Zenoh { .. } => Self::Transient(error.to_string()),
             _ => Self::Input(error.to_string()),
         }
     }

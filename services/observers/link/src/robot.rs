@@ -246,13 +246,7 @@ impl Robot<'_> {
             return Ok(None);
         }
         if got > expected {
-            let topic = Pose::TOPIC;
-            return Err(StageError::SequenceGap {
-                topic,
-                expected,
-                got,
-            }
-            .into());
+            return Err(StageError::gap(Pose::TOPIC, expected, got).into());
         }
         pose.item = self.timed(pose.item);
         self.journal.append(&pose)?;
