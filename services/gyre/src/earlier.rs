@@ -11,8 +11,8 @@ use std::{
 use gyre_configuration::Configuration;
 use gyre_journal::{
     self as journal, Content, JournalError,
-    checkpoint::{self, Checkpoint, CheckpointError},
-    keyframes::{KeyframesError, complete_poses},
+    checkpoint::{self, Checkpoint},
+    keyframes::complete_poses,
     objects::LoggedObjects,
     scans::{LoggedScan, complete_scans},
 };
@@ -277,11 +277,7 @@ fn known_poses(
             ));
             Ok(0)
         }
-        None => Err(CheckpointError::Missing {
-            path,
-            item: content.poses,
-        }
-        .into()),
+        None => Err(JournalError::no_state(&path, content.poses).into()),
     }
 }
 
@@ -317,9 +313,9 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
     Ok(Out::lock(path)?)
 }
 
-fn damaged(error: KeyframesError) -> Failure {
+fn damaged(error: JournalError) -> Failure {
     match error {
-        KeyframesError::Log(LogError::Damaged { .. }) => format!(
+        JournalError::Log(LogError::Damaged { .. }) => format!(
             "{error}: restore it from a backup, choose another --out, or begin anew with --fresh"
         )
         .into(),

@@ -10,7 +10,7 @@ use gyre_configuration::Configuration;
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
-    self as journal, Journal,
+    self as journal, Journal, PoseLog,
     checkpoint::{self, Checkpoint},
     keyframes::Keyframes,
 };

@@ -20,6 +20,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+use gyre_geometry::SparsePoint;
 use gyre_messages::{PoseHeader, flag};
 use gyre_storage::DurableFile;
 
@@ -36,6 +37,22 @@ pub struct Journal {
     records: u64,
     found: u64,
     buffer: [u8; RECORD],
+}
+
+/// A log of poses with the points of their scans, each appended before its pose is journalled.
+pub trait PoseLog {
+    /// Allocates the memory for records of up to `points` points: later appends allocate nothing.
+    fn reserve(&mut self, points: usize);
+
+    /// Takes the next pose, before it is journalled. Returns whether it was appended.
+    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError>;
+
+    /// Marks the end of the stream, before the journal does. All records survive a power failure
+    /// when this returns.
+    fn end(&mut self) -> Result<(), JournalError>;
+
+    /// Waits until all records so far survive a power failure.
+    fn sync(&self) -> Result<(), JournalError>;
 }
 
 pub fn path(out: &Path) -> PathBuf {
