@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 
 use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
-use gyre_journal::loops::loop_header;
+use gyre_journal::loops::loops_of;
 use gyre_messages::{Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
@@ -118,20 +118,11 @@ impl LoopClosing {
         }
         (self.loops, self.has_finished) = (0, false);
         self.pending.clear();
-        let mut last = None;
         for index in 0..self.queries.len() {
             let query = self.queries.read(index)?;
-            let loops = query.loops().count() as u64;
-            if loops > 0 {
-                last = Some((self.loops, query));
-            }
-            self.loops += loops;
-        }
-        if let Some((before, query)) = last {
-            // An observer that comes now receives the last one.
-            self.loops = before;
             self.note(&query)?;
-            self.pending.drain(..self.pending.len() - 1);
+            // An observer that comes now receives the last one.
+            self.pending.drain(..self.pending.len().saturating_sub(1));
         }
         self.closer.restore_queries(self.queries.len());
         Ok(())
@@ -187,13 +178,9 @@ impl LoopClosing {
 
     /// Counts the loops of a query, which are to be published.
     fn note(&mut self, query: &Query) -> Result<(), StageError> {
-        for (candidate, _) in query.loops() {
-            let ends = [query.keyframe, candidate.place];
-            let [later, earlier] = ends.map(|index| self.keyframes.read(index));
-            let header = loop_header(self.loops, &later?, &earlier?, candidate);
-            self.loops += 1;
-            self.pending.push_back(header);
-        }
+        let found = loops_of(query, self.loops, &mut self.keyframes)?;
+        self.loops += found.len() as u64;
+        self.pending.extend(found);
         Ok(())
     }
 }
