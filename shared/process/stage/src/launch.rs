@@ -194,25 +194,11 @@ pub fn main(
             // The span of the launch has ended.
             let stage = tracing::error_span!("process", stage = name);
             stage.in_scope(|| tracing::error!("{error}"));
-            let sentence = format!("{name}: {error}");
-            // Either fails if the disk is full.
+            // The supervisor reads the last line.
+            let sentence = format!("{name}: {error}").replace('\n', " ");
             let _ = writeln!(std::io::stderr(), "{sentence}");
-            // For the supervisor, in shared memory: the disk of the logs may be full.
-            if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
-                let path = PathBuf::from(root).join(last_words(name, stands_by()));
-                let _ = run::write(path, &sentence);
-            }
             ExitCode::from(error.exit_code())
         }
-    }
-}
-
-/// Returns the name of the file in the run's root where a stage, or a process on standby, writes
-/// why it ended.
-pub fn last_words(stage: &str, stands_by: bool) -> String {
-    match stands_by {
-        true => format!("{stage}.standby.error"),
-        false => format!("{stage}.error"),
     }
 }
 

@@ -7,7 +7,7 @@ mod sequence;
 
 use std::{
     fs::File,
-    path::{Path, PathBuf},
+    path::Path,
     process, thread,
     time::{Duration, Instant},
 };
@@ -111,7 +111,7 @@ impl ObservedRun {
     /// all topics are observed, and reports the waits for `signals` from here on.
     pub fn is_ready(&self, name: &str, signals: &Signals) -> Result<(), StageError> {
         signals.report_to(HeartbeatWriter::create(&self.manifest, name)?);
-        run::write(ready_file(&self.manifest.root), "")
+        run::write(run::ready_file(&self.manifest.root, name), "")
     }
 
     /// Reports to the supervisor how many messages its recorder, this process, has missed so far.
@@ -191,11 +191,6 @@ impl ObservedRun {
         reader::notify_publisher(&self.node, topic.name)?;
         Ok(port)
     }
-}
-
-/// Returns the file in the run's root that the recorder writes when it observes all topics.
-pub fn ready_file(root: &Path) -> PathBuf {
-    root.join("recorder.ready")
 }
 
 /// Returns the number of missed messages that the recorder, this process, has reported; 0 without a

@@ -2,9 +2,7 @@
 
 use std::{
     collections::VecDeque,
-    fs,
     os::unix::process::ExitStatusExt,
-    path::PathBuf,
     process::ExitStatus,
     time::{Duration, Instant},
 };
@@ -13,7 +11,6 @@ use gyre_messages::StageId;
 use gyre_stage::{
     Manifest, StageError,
     heartbeat::{self, Heartbeat},
-    launch,
     run::SHARED_MEMORY,
 };
 use rustix::process::{Pid, Signal, kill_process_group};
@@ -42,7 +39,6 @@ pub(crate) struct Child {
     is_held: bool,
     deaths: VecDeque<Instant>,
     pose_at_restart: Option<Option<u64>>,
-    last_words: PathBuf,
     log: Log,
     pub last_death: Option<String>,
     /// Why the last program that was given up for this one could not be started.
@@ -69,7 +65,6 @@ impl Child {
             is_held: false,
             deaths: VecDeque::new(),
             pose_at_restart: None,
-            last_words: last_words(manifest, &plan.name, position),
             log,
             last_death: None,
             start_error: None,
@@ -91,7 +86,6 @@ impl Child {
                 path.display()
             )));
         }
-        self.last_words = last_words(manifest, &self.plan.name, Position::Free);
         self.process = starter.start(&self.plan, manifest, self.log.output(), Position::Free)?;
         self.started = Instant::now();
         self.status = None;
@@ -266,20 +260,10 @@ impl Child {
         }
     }
 
-    /// Returns the reason that the process gave, else the last line of its output.
+    /// Returns the last line of its output since the last call: the reason that it gave.
     pub fn last_output(&mut self) -> Option<String> {
-        let reason = fs::read_to_string(&self.last_words).ok();
-        let _ = fs::remove_file(&self.last_words);
-        let output = self.log.last_line();
-        // It is empty if shared memory was full.
-        reason.filter(|reason| !reason.is_empty()).or(output)
+        self.log.last_line()
     }
-}
-
-/// A process that stands by has its own file: the other is in use.
-fn last_words(manifest: &Manifest, name: &str, position: Position) -> PathBuf {
-    let stands_by = position == Position::Taken;
-    manifest.root.join(launch::last_words(name, stands_by))
 }
 
 impl Drop for Child {

@@ -1,51 +1,25 @@
 //! The state of a process as `gyre ps` shows it.
 
-use gyre_messages::StageId;
 use gyre_stage::{
     control::{Activity, ProcessStatus},
-    heartbeat::{self, Heartbeat},
-    source::received_of,
+    heartbeat,
 };
 
-use crate::{child::Child, processes::Processes, run::Run};
+use crate::{child::Child, run::Run};
 
-pub(crate) fn status_of(process: usize, processes: &Processes, run: &Run<'_>) -> ProcessStatus {
-    let child = &processes[process];
+/// Returns the state of a process, whose activity is `otherwise` where it writes no heartbeat.
+pub(crate) fn status_of(child: &Child, run: &Run<'_>, otherwise: Activity) -> ProcessStatus {
     let beat = child.heartbeat(run.manifest());
     let activity = match beat {
         _ if child.is_known_to_have_exited() => Activity::Ended,
         _ if run.is_starting(child) => Activity::Starting,
-        None => Activity::Running,
-        Some(beat) => activity(beat),
-    };
-    ProcessStatus {
-        is_swapped: child.plan.command != run.plan.stages[process].command,
-        restarts: processes
-            .restarts
-            .get(child.name())
-            .copied()
-            .unwrap_or_default(),
-        received: match child.stage() {
-            Some(StageId::RadarReplay) => received_of(run.manifest()),
-            _ => None,
+        None => otherwise,
+        Some(beat) if beat.is_silent() => Activity::Silent,
+        Some(beat) => match beat.activity {
+            heartbeat::Activity::Works => Activity::Working,
+            heartbeat::Activity::Waits => Activity::Waiting,
         },
-        ..of_child(child, beat, activity)
-    }
-}
-
-pub(crate) fn activity(beat: Heartbeat) -> Activity {
-    match beat.activity {
-        _ if beat.is_silent() => Activity::Silent,
-        heartbeat::Activity::Works => Activity::Working,
-        heartbeat::Activity::Waits => Activity::Waiting,
-    }
-}
-
-pub(crate) fn of_child(
-    child: &Child,
-    beat: Option<Heartbeat>,
-    activity: Activity,
-) -> ProcessStatus {
+    };
     ProcessStatus {
         name: child.name().to_owned(),
         pid: child.pid(),

@@ -2,15 +2,18 @@
 
 use std::{env, path::Path, process};
 
+use gyre_messages::StageId;
 use gyre_stage::{
     StageError, clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
     schedule, sink,
+    source::received_of,
     wake::{MAX_WAIT, Signals},
 };
 
 use crate::{
     StagePlan, SuperviseError,
+    child::Child,
     process_status::status_of,
     socket::{Client, ControlSocket},
     supervisor::Supervisor,
@@ -210,8 +213,18 @@ impl Supervisor<'_> {
 
     fn status(&self) -> Status {
         let manifest = self.run.manifest();
-        let processes = (0..self.processes.len()).map(|i| status_of(i, &self.processes, &self.run));
-        let mut processes: Vec<ProcessStatus> = processes.collect();
+        let status = |(child, begun): (&Child, &StagePlan)| {
+            let restarts = self.processes.restarts.get(child.name());
+            let is_source = child.stage() == Some(StageId::RadarReplay);
+            ProcessStatus {
+                is_swapped: child.plan.command != begun.command,
+                restarts: restarts.copied().unwrap_or_default(),
+                received: is_source.then(|| received_of(manifest)).flatten(),
+                ..status_of(child, &self.run, Activity::Running)
+            }
+        };
+        let begun = &self.run.plan.stages;
+        let mut processes: Vec<_> = self.processes.iter().zip(begun).map(status).collect();
         let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
         let phase = match () {
             () if self.followers.are_awaited => Phase::Following,
@@ -219,11 +232,7 @@ impl Supervisor<'_> {
             () => Phase::Running,
         };
         // Nothing waits for it.
-        processes.extend(
-            self.recorder
-                .iter()
-                .map(|recorder| recorder.status(manifest)),
-        );
+        processes.extend(self.recorder.iter().map(|it| it.status(&self.run)));
         Status {
             pid: process::id(),
             out: manifest.out.clone(),
