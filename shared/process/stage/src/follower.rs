@@ -56,7 +56,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     launch.begin_heartbeat()?;
     let mut flow = Flow {
         output: Writer::open(&launch.node, &launch.manifest)?,
-        report: Numbers::open(&launch.manifest, &file_of(&launch.name), 0)?,
+        report: Numbers::open(&launch.manifest, &file_of(&launch.name))?,
         delay: launch.delay(),
         next_seq: 0,
         counters: StageCounters::default(),
@@ -142,7 +142,7 @@ impl Progress {
 /// Returns the progress of a follower and whether it has come to its end; `None` before its first
 /// step.
 pub fn progress_of(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {
-    let [done, total, ended] = numbers::read(&manifest.root.join(file_of(follower)), 0)?;
+    let [done, total, ended] = numbers::read(&manifest.root.join(file_of(follower)))?;
     Some((Progress { done, total }, ended == 1))
 }
 

@@ -116,7 +116,7 @@ impl ObservedRun {
 
     /// Reports to the supervisor how many messages its recorder, this process, has missed so far.
     pub fn tell_missed(&self, missed: u64) -> Result<(), StageError> {
-        let mut file = Numbers::open(&self.manifest, MISSED, 0)?;
+        let mut file = Numbers::open(&self.manifest, MISSED)?;
         file.write([process::id().into(), missed])
     }
 
@@ -196,7 +196,7 @@ impl ObservedRun {
 /// Returns the number of missed messages that the recorder, this process, has reported; 0 without a
 /// report.
 pub fn read_missed(root: &Path, recorder: u32) -> u64 {
-    match numbers::read(&root.join(MISSED), 0) {
+    match numbers::read(&root.join(MISSED)) {
         Some([process, missed]) if process == u64::from(recorder) => missed,
         // The recorder before has left its own.
         _ => 0,

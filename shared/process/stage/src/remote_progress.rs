@@ -12,7 +12,7 @@ const FILE: &str = "elsewhere";
 
 /// Begins without the other machine, which has not reported where it continues.
 pub(crate) fn begin(manifest: &Manifest) -> Result<Numbers<1>, StageError> {
-    let mut file = Numbers::open(manifest, FILE, 0)?;
+    let mut file = Numbers::open(manifest, FILE)?;
     file.write([u64::MAX])?;
     Ok(file)
 }
@@ -20,5 +20,5 @@ pub(crate) fn begin(manifest: &Manifest) -> Result<Numbers<1>, StageError> {
 /// Returns whether stages on another machine owe the pose of an item that was handed over to them,
 /// after so many poses.
 pub fn owes(manifest: &Manifest, poses: u64) -> bool {
-    numbers::read(&manifest.root.join(FILE), 0).is_some_and(|[items]| items > poses)
+    numbers::read(&manifest.root.join(FILE)).is_some_and(|[items]| items > poses)
 }

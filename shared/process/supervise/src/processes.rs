@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    ops::{Index, IndexMut},
+    ops::{Deref, DerefMut},
     time::{Duration, Instant},
 };
 
@@ -20,17 +20,17 @@ pub(crate) struct Processes {
     pub restarts: BTreeMap<String, usize>,
 }
 
-impl Index<usize> for Processes {
-    type Output = Child;
+impl Deref for Processes {
+    type Target = [Child];
 
-    fn index(&self, process: usize) -> &Child {
-        &self.children[process]
+    fn deref(&self) -> &[Child] {
+        &self.children
     }
 }
 
-impl IndexMut<usize> for Processes {
-    fn index_mut(&mut self, process: usize) -> &mut Child {
-        &mut self.children[process]
+impl DerefMut for Processes {
+    fn deref_mut(&mut self) -> &mut [Child] {
+        &mut self.children
     }
 }
 
@@ -43,14 +43,6 @@ impl Processes {
             self.children.push(child);
         }
         Ok(())
-    }
-
-    pub fn len(&self) -> usize {
-        self.children.len()
-    }
-
-    pub fn iter(&self) -> impl Iterator<Item = &Child> {
-        self.children.iter()
     }
 
     /// Returns the followers and the stages that have ended.

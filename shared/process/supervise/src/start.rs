@@ -102,11 +102,11 @@ impl<'a> Starter<'a> {
             // supervisor, which then stops each stage.
             .process_group(0);
         let (supervisor, guardian) = (getpid(), self.guardian.pipe());
-        let scheduling = scheduling::prepare(&plan.scheduling);
+        let scheduling = plan.scheduling.clone();
         let prepare = move || {
             set_parent_process_death_signal(Some(Signal::KILL))?;
             guardian.into_iter().for_each(guardian::join);
-            if let Err((key, error)) = scheduling.apply() {
+            if let Err((key, error)) = scheduling::apply(&scheduling) {
                 let _ = rustix::io::write(&refusals, &[key]);
                 return Err(error);
             }

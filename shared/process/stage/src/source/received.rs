@@ -94,11 +94,11 @@ impl Received {
 
 /// Returns the deliveries of a run's sensor; `None` if its source is no sensor.
 pub fn read(manifest: &Manifest) -> Option<Received> {
-    numbers::read(&manifest.root.join(FILE), 0).map(Received::of)
+    numbers::read(&manifest.root.join(FILE)).map(Received::of)
 }
 
 pub(super) fn open(manifest: &Manifest) -> Result<Numbers<9>, StageError> {
-    Numbers::open(manifest, FILE, 0)
+    Numbers::open(manifest, FILE)
 }
 
 #[cfg(test)]
