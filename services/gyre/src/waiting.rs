@@ -26,7 +26,7 @@ const REPORT_EVERY: Duration = Duration::from_secs(60);
 
 fn may_come(error: &Failure) -> bool {
     let radar = error.downcast_ref::<AskError>();
-    radar.is_some_and(AskError::may_pass) || ros2::may_come(error)
+    radar.is_some_and(|it| it.may_pass) || ros2::may_come(error)
 }
 
 fn notice(error: &Failure) -> String {

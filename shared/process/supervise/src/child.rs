@@ -241,7 +241,7 @@ impl Child {
     pub fn await_end(&mut self) -> Result<(), SuperviseError> {
         // After one wait in vain there is no second one.
         if !self.has_exited() && !self.is_held {
-            self.is_held = !ends_within(&self.process, KILL_TIMEOUT);
+            self.is_held = !ends_within(&mut self.process, KILL_TIMEOUT);
         }
         match self.has_exited() {
             true => Ok(()),
