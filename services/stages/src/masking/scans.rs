@@ -29,20 +29,18 @@ pub struct Scans {
 }
 
 pub struct ScanView<'a> {
+    pub current: MovedScan<'a>,
+    pub previous: Option<MovedScan<'a>>,
+    pub turn: Option<GyroTurn>,
+    pub distance: Option<WheelDistance>,
+}
+
+pub struct MovedScan<'a> {
     pub scan: &'a Received<Scan>,
     /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
     /// with the yaw rate of the gyro; `None` without such a motion.
     pub twist: Option<Twist>,
-    pub turn: Option<GyroTurn>,
-    pub distance: Option<WheelDistance>,
     /// Where its azimuths were lost, if it has a pose from before a restart.
-    pub lost: Option<LostAzimuths>,
-    pub previous: Option<PreviousScan<'a>>,
-}
-
-pub struct PreviousScan<'a> {
-    pub scan: &'a Received<Scan>,
-    pub twist: Option<Twist>,
     pub lost: Option<LostAzimuths>,
 }
 
@@ -90,18 +88,19 @@ impl Inputs for Scans {
         let [motion, previous_motion] = self.found;
         let [previous_rate, rate] = self.gyro.sweep_rates_radps();
         let [lost, previous_lost] = self.lost;
-        let previous = self.queue.previous().map(|scan| PreviousScan {
-            scan,
-            twist: with_yaw_rate(previous_motion, previous_rate),
-            lost: previous_lost,
-        });
         Some(ScanView {
-            scan: self.queue.current()?,
-            twist: with_yaw_rate(motion, rate),
+            current: MovedScan {
+                scan: self.queue.current()?,
+                twist: with_yaw_rate(motion, rate),
+                lost,
+            },
+            previous: self.queue.previous().map(|scan| MovedScan {
+                scan,
+                twist: with_yaw_rate(previous_motion, previous_rate),
+                lost: previous_lost,
+            }),
             turn: self.gyro.turn(),
             distance: self.wheels.distance(),
-            lost,
-            previous,
         })
     }
 

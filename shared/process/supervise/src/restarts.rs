@@ -74,15 +74,16 @@ impl Supervisor<'_> {
     fn go_back(&mut self, process: usize, reason: &str) -> bool {
         let begun = &self.run.plan.stages[process];
         let child = &mut self.processes[process];
-        let poses = self.poses.count();
-        let has_gone_back = self.swaps.go_back(process, child, begun, reason, poses);
-        if has_gone_back {
-            let stage = &begun.name;
-            self.run.note(&format!(
-                "{stage} goes back to the program before: {reason}"
-            ));
+        let failed = child.plan.command.join(" ");
+        if !child.go_back(begun) {
+            return false;
         }
-        has_gone_back
+        let name = child.name();
+        self.swaps.fail_trial(process, name, &failed, reason);
+        self.swaps.has_swapped(&child.plan, self.poses.count());
+        let sentence = format!("{name} goes back to the program before: {reason}");
+        self.run.note(&sentence);
+        true
     }
 
     pub(crate) fn restart(

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use gyre_messages::flag;
 use gyre_stage::{
     StageCounters, counters, sink, transport,
     wake::{self, Signals},
@@ -16,7 +17,7 @@ use crate::{
     followers::Followers,
     log::Logs,
     observers::Sweep,
-    poses::{News, Poses},
+    poses::Poses,
     processes::Processes,
     recorder::Recorder,
     recovery::Recovery,
@@ -157,11 +158,11 @@ impl<'a> Supervisor<'a> {
     }
 
     fn read_poses(&mut self) -> Result<bool, SuperviseError> {
-        while let Some(news) = self.poses.next()? {
-            let News::Pose(received) = news else {
-                return Ok(true);
-            };
+        while let Some(received) = self.poses.next()? {
             let pose = received.header();
+            if pose.item.is(flag::END) {
+                return Ok(true);
+            }
             self.stalls.progress(&pose.item);
             self.processes.pass_trials(pose, &self.recovery);
             self.recovery.see(pose);

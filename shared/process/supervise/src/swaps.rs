@@ -139,24 +139,6 @@ impl Swaps {
             after_poses,
         });
     }
-
-    /// False without a program to go back to.
-    pub fn go_back(
-        &mut self,
-        process: usize,
-        child: &mut Child,
-        begun: &StagePlan,
-        reason: &str,
-        after_poses: u64,
-    ) -> bool {
-        let failed = child.plan.command.join(" ");
-        let has_gone_back = child.go_back(begun);
-        if has_gone_back {
-            self.fail_trial(process, child.name(), &failed, reason);
-            self.has_swapped(&child.plan, after_poses);
-        }
-        has_gone_back
-    }
 }
 
 impl Standby {
