@@ -8,7 +8,6 @@ use std::{
     path::{Path, PathBuf},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     thread,
-    time::{Duration, Instant},
 };
 
 use gyre_stage::{Manifest, StageError};
@@ -17,11 +16,8 @@ use rustix::{
     io::{Errno, ioctl_fionbio},
 };
 
-use crate::Plan;
-
 /// Size of a log beyond which it is moved to its `.old`, bytes.
 const MAX: u64 = 8 << 20;
-const PERIOD: Duration = Duration::from_secs(1);
 
 /// The log of a supervisor that runs in the background, by its name in the folder of the logs.
 const BACKGROUND: &str = "gyre";
@@ -170,32 +166,10 @@ pub fn last_line(text: &str) -> Option<&str> {
     said.lines().rfind(|line| !is_silent(line))
 }
 
-/// The logs of a run where processes append directly, and which are kept short.
-pub(crate) struct Logs {
-    files: Vec<PathBuf>,
-    due: Instant,
-}
-
-impl Logs {
-    pub fn of(plan: &Plan) -> Self {
-        let background = path_of(&plan.manifest, BACKGROUND);
-        Self {
-            files: vec![plan.manifest.events(), background],
-            due: Instant::now(),
-        }
-    }
-
-    pub fn bound_if_due(&mut self) {
-        let now = Instant::now();
-        if now >= self.due {
-            self.due = now + PERIOD;
-            self.bound();
-        }
-    }
-
-    pub fn bound(&self) {
-        self.files.iter().for_each(|file| bound(file));
-    }
+/// Keeps the logs of a run short where processes append directly.
+pub(crate) fn bound_all(manifest: &Manifest) {
+    bound(&manifest.events());
+    bound(&path_of(manifest, BACKGROUND));
 }
 
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {

@@ -14,33 +14,17 @@ const PERIOD: Duration = Duration::from_secs(1);
 /// includes a cleanup.
 const PERIOD_AFTER_FAILURE: Duration = Duration::from_secs(30);
 
-/// Looks for killed observers at a low rate, since nothing informs the supervisor of their death.
-pub(crate) struct Sweep {
-    due: Instant,
-}
-
-impl Sweep {
-    pub(crate) fn new() -> Self {
-        Self {
-            due: Instant::now() + PERIOD,
-        }
-    }
-
-    /// `processes` is the number of the run's own processes.
-    pub(crate) fn run_if_due(&mut self, run: &Run<'_>, processes: usize) {
-        let now = Instant::now();
-        if now < self.due {
-            return;
-        }
-        let has_observers = nodes(run.manifest()) > processes;
-        let failed =
-            has_observers && clean::remove_dead_observers(run.manifest(), &run.transport).is_err();
-        self.due = now
-            + match failed {
-                true => PERIOD_AFTER_FAILURE,
-                false => PERIOD,
-            };
-    }
+/// Looks for killed observers beside the run's own processes; returns when to look again. At a low
+/// rate, since nothing informs the supervisor of their death.
+pub(crate) fn sweep(run: &Run<'_>, processes: usize) -> Instant {
+    let has_observers = nodes(run.manifest()) > processes;
+    let failed =
+        has_observers && clean::remove_dead_observers(run.manifest(), &run.transport).is_err();
+    let period = match failed {
+        true => PERIOD_AFTER_FAILURE,
+        false => PERIOD,
+    };
+    Instant::now() + period
 }
 
 fn nodes(manifest: &Manifest) -> usize {

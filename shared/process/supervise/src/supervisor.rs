@@ -1,7 +1,10 @@
 //! The loop of the supervisor. Its parts look at events and decide; `restarts` and `requests` carry
 //! out their decisions.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
 
 use gyre_messages::flag;
 use gyre_stage::{
@@ -15,8 +18,7 @@ use crate::{
     Ending, Event, Plan, SuperviseError,
     child::Child,
     followers::Followers,
-    log::Logs,
-    observers::Sweep,
+    log, observers,
     poses::Poses,
     processes::Processes,
     recorder::Recorder,
@@ -26,6 +28,9 @@ use crate::{
     stall::Stalls,
     swaps::{ENDED, Swaps},
 };
+
+/// Time between two looks at the lengths of the logs.
+const PERIOD: Duration = Duration::from_secs(1);
 
 /// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not
 /// help.
@@ -54,8 +59,9 @@ pub(crate) struct Supervisor<'a> {
     pub followers: Followers<'a>,
     pub swaps: Swaps,
     pub socket: ControlSocket,
-    observers: Sweep,
-    logs: Logs,
+    /// When killed observers and the lengths of the logs are looked for again.
+    sweep_due: Instant,
+    logs_due: Instant,
     /// True when all stages have opened their topics once.
     is_ready: bool,
     /// True when a notice about the run was reported.
@@ -80,8 +86,8 @@ impl<'a> Supervisor<'a> {
             followers: Followers::of(plan),
             swaps: Swaps::default(),
             socket: ControlSocket::open(&plan.manifest.root)?,
-            observers: Sweep::new(),
-            logs: Logs::of(plan),
+            sweep_due: Instant::now() + PERIOD,
+            logs_due: Instant::now(),
             is_ready: false,
             has_notice: false,
             run,
@@ -109,8 +115,10 @@ impl<'a> Supervisor<'a> {
             }
             self.run.say(Event::Watched);
             self.keep_house()?;
-            let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
-            self.observers.run_if_due(&self.run, own);
+            if Instant::now() >= self.sweep_due {
+                let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
+                self.sweep_due = observers::sweep(&self.run, own);
+            }
             let (followers, stages) = self.processes.ended(self.run.roles());
             self.recover_followers(&followers)?;
             match stages.is_empty() {
@@ -173,7 +181,10 @@ impl<'a> Supervisor<'a> {
 
     /// Keeps the logs short, and the processes alive that nothing depends on.
     fn keep_house(&mut self) -> Result<(), SuperviseError> {
-        self.logs.bound_if_due();
+        if Instant::now() >= self.logs_due {
+            self.logs_due = Instant::now() + PERIOD;
+            log::bound_all(self.run.manifest());
+        }
         if !self.has_notice
             && let Some(sentence) = sink::notice(self.run.manifest())
         {
@@ -199,7 +210,7 @@ impl<'a> Supervisor<'a> {
             recorder.stop(&mut self.run, ending)?;
         }
         stopped?;
-        self.logs.bound();
+        log::bound_all(self.run.manifest());
         // The failure that the run ends by is the first one.
         match ending {
             Some(_) => self.processes.require_good_ends(&self.followers),
