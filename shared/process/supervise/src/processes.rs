@@ -10,8 +10,8 @@ use gyre_messages::PoseHeader;
 use gyre_stage::wake;
 
 use crate::{
-    END_TIMEOUT, Ending, Event, SuperviseError, child::Child, followers::Followers,
-    guardian::Guardian, recovery::Recovery, roles::Roles, run::Run, start::Position,
+    END_TIMEOUT, Ending, Event, Plan, SuperviseError, child::Child, followers::Followers,
+    guardian::Guardian, recovery::Recovery, run::Run, start::Position,
 };
 
 #[derive(Default)]
@@ -46,10 +46,10 @@ impl Processes {
     }
 
     /// Returns the followers and the stages that have ended.
-    pub fn ended(&mut self, roles: Roles<'_>) -> (Vec<usize>, Vec<usize>) {
+    pub fn ended(&mut self, plan: &Plan) -> (Vec<usize>, Vec<usize>) {
         let children = self.children.iter_mut().enumerate();
         let ended = children.filter_map(|(i, child)| child.has_exited().then_some(i));
-        ended.partition(|i| roles.follows(*i))
+        ended.partition(|i| plan.follows(*i))
     }
 
     pub fn are_ready(&self, run: &Run<'_>) -> bool {

@@ -75,7 +75,7 @@ impl Supervisor<'_> {
     }
 
     fn refuse_unknown(&self, process: &str, client: Client) {
-        let names: Vec<&str> = self.run.roles().names().collect();
+        let names: Vec<&str> = self.run.plan.names().collect();
         let names = names.join(", ");
         client.answer(&Answer::Refused(format!(
             "the run has no process `{process}`; it has {names}"
@@ -84,7 +84,7 @@ impl Supervisor<'_> {
 
     /// It counts as a restart and not as a death.
     fn restart_on_request(&mut self, name: &str, client: Client) -> Result<(), SuperviseError> {
-        let Some(process) = self.run.roles().named(name) else {
+        let Some(process) = self.run.plan.named(name) else {
             let newest = self.poses.newest_seq();
             match &mut self.recorder {
                 Some(recorder) if recorder.name() == name => {
@@ -95,7 +95,7 @@ impl Supervisor<'_> {
             }
             return Ok(());
         };
-        let stages = self.run.roles().restarted_with(process);
+        let stages = self.run.plan.restarted_with(process);
         let why_not = self.processes.why_not_again(stages.iter().copied());
         client.answer(&match why_not {
             Some(reason) => Answer::Refused(reason),
@@ -114,7 +114,7 @@ impl Supervisor<'_> {
 
     /// The client has its answer when the new program has worked on a first pose.
     fn begin_swap(&mut self, swap: &Swap, client: Client) -> Result<(), SuperviseError> {
-        let Some(process) = self.run.roles().named(&swap.process) else {
+        let Some(process) = self.run.plan.named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
             return Ok(());
         };
@@ -136,7 +136,7 @@ impl Supervisor<'_> {
         plan: StagePlan,
         client: Client,
     ) -> Result<(), SuperviseError> {
-        let stages = self.run.roles().restarted_with(process);
+        let stages = self.run.plan.restarted_with(process);
         if let Some(reason) = self.why_others_stay(process, &stages) {
             client.answer(&Answer::Refused(reason));
             return Ok(());
@@ -182,7 +182,7 @@ impl Supervisor<'_> {
     /// Ends the replaced program, and lets the new one continue.
     fn take_over(&mut self, standby: Standby) -> Result<(), SuperviseError> {
         let process = standby.process;
-        let stages = self.run.roles().restarted_with(process);
+        let stages = self.run.plan.restarted_with(process);
         if let Some(reason) = self.why_others_stay(process, &stages) {
             self.give_up(standby, &reason);
             return Ok(());

@@ -23,7 +23,7 @@ impl Supervisor<'_> {
         let newest = self.poses.newest_seq();
         let died_without_progress = |i: usize| self.processes[i].died_without_progress(newest);
         let stages = [dead, &blamed].concat();
-        let restarted = restarted_after(&stages, self.run.roles(), died_without_progress);
+        let restarted = restarted_after(&stages, self.run.plan, died_without_progress);
         self.restart(&restarted, died_ns)
     }
 
@@ -31,7 +31,7 @@ impl Supervisor<'_> {
     /// these processes.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
         let is_blamed = |i: &usize| self.processes[*i].is_on_trial && !dead.contains(i);
-        let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
+        let mut blamed: Vec<usize> = self.run.plan.in_stream().filter(is_blamed).collect();
         blamed.retain(|i| self.go_back(*i, failure));
         blamed
     }

@@ -11,7 +11,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Event, Plan, SuperviseError, child::Child, guardian::Guardian, roles::Roles, start::Starter,
+    Event, Plan, SuperviseError, child::Child, guardian::Guardian, start::Starter,
     wake_limit::WakeLimit,
 };
 
@@ -59,10 +59,6 @@ impl<'a> Run<'a> {
 
     pub fn manifest(&self) -> &'a Manifest {
         &self.plan.manifest
-    }
-
-    pub fn roles(&self) -> Roles<'a> {
-        Roles::of(self.plan)
     }
 
     pub fn starter(&self) -> Starter<'_> {

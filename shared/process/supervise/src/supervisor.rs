@@ -119,7 +119,7 @@ impl<'a> Supervisor<'a> {
                 let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
                 self.sweep_due = observers::sweep(&self.run, own);
             }
-            let (followers, stages) = self.processes.ended(self.run.roles());
+            let (followers, stages) = self.processes.ended(self.run.plan);
             self.recover_followers(&followers)?;
             match stages.is_empty() {
                 true => self.look_for_stalls()?,
