@@ -9,11 +9,7 @@ use std::{
 
 use gyre_configuration::Configuration;
 use gyre_results::Out;
-use gyre_stage::{
-    control::Status,
-    run::{RootError, RunRoot},
-    wake::Signals,
-};
+use gyre_stage::{StageError, control::Status, run::RunRoot, wake::Signals};
 use gyre_stages::live_radar::{AskError, Sizes};
 use gyre_supervise::wait;
 use gyre_terminal::{Failure, print};
@@ -84,5 +80,5 @@ pub fn for_radar(
         notifier.keep_alive();
         None
     });
-    answer?.ok_or(RootError::Interrupted)?
+    answer?.ok_or(StageError::Stopped)?
 }

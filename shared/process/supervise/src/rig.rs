@@ -14,7 +14,7 @@ use gyre_stage::{
     Launch, Manifest, StageError,
     message::AnyMessage,
     reader::Port,
-    run::{self, RunRoot},
+    run::RunRoot,
     services::Services,
     transport::{self, Listener, Node, Service, Transport},
     wake::Signals,
@@ -77,8 +77,7 @@ impl<'a> Rig<'a> {
         signals: &'a Signals,
     ) -> Result<Self, SuperviseError> {
         transport::silence();
-        let unusable = |e: run::RootError| StageError::Input(e.to_string());
-        let root = RunRoot::acquire(&manifest.out, signals).map_err(unusable)?;
+        let root = RunRoot::acquire(&manifest.out, signals)?;
         (manifest.prefix, manifest.root) = (root.prefix(), root.path().to_owned());
         manifest.write(configuration)?;
         let transport = manifest.transport()?;
