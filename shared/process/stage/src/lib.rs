@@ -45,7 +45,6 @@ pub mod stage;
 mod tests;
 pub mod transport;
 pub mod wake;
-pub mod writer;
 
 pub use counters::CountingAllocator;
 pub use error::StageError;
@@ -58,4 +57,4 @@ pub use manifest::Manifest;
 pub use sink::Sink;
 pub use source::Source;
 pub use stage::Stage;
-pub use transport::Listener;
+pub use transport::{Listener, writer};

@@ -5,6 +5,7 @@
 mod event;
 mod port;
 mod service;
+pub mod writer;
 
 use std::{fmt::Debug, path::Path};
 
@@ -24,7 +25,7 @@ pub use event::Listener;
 #[cfg(test)]
 pub(crate) use event::bind_alone;
 pub(crate) use event::{Event, Notifier};
-pub(crate) use port::{Loan, Publisher, Sample, Subscriber};
+pub(crate) use port::{Sample, Subscriber};
 pub use service::Service;
 
 type Ipc = ipc::Service;

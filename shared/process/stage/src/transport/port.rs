@@ -1,119 +1,14 @@
-//! The ports that publish and receive a topic.
+//! The port that receives a topic.
 
 use std::slice;
 
-use gyre_messages::{Item, Limits, Window};
 use iceoryx2::{
-    port::{
-        ReceiveError, port_name::PortName, publisher, subscriber,
-        update_connections::UpdateConnections,
-    },
-    prelude::BackpressureStrategy,
+    port::{ReceiveError, port_name::PortName, subscriber},
     sample,
-    sample_mut::SampleMut,
 };
 
 use super::{AnyHeader, AnyPayload, Ipc, Service};
 use crate::StageError;
-
-pub(crate) struct Publisher {
-    topic: &'static str,
-    header_bytes: usize,
-    elements: usize,
-    port: publisher::Publisher<Ipc, AnyPayload, AnyHeader>,
-}
-
-pub(crate) struct Loan {
-    sample: SampleMut<Ipc, AnyPayload, AnyHeader>,
-    header_bytes: usize,
-}
-
-impl Publisher {
-    pub(crate) fn create(
-        service: &Service,
-        window: &Window,
-        limits: &Limits,
-    ) -> Result<Self, StageError> {
-        let topic = &service.topic;
-        let (sizes, elements) = ((topic.sizes)(window), (topic.max_elements)(limits));
-        let port = service
-            .factory
-            .publisher_builder()
-            .initial_max_slice_len(elements)
-            .max_loaned_samples(sizes.loaned)
-            // The transport would reserve a queue of samples of its own for each subscriber.
-            .override_sample_preallocation(move |_| sizes.samples())
-            // Never wait for a slow or dead reader: the window bounds the items in flight.
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|e| StageError::transport(format!("publish {}", topic.name), e))?;
-        Ok(Self {
-            topic: topic.name,
-            header_bytes: topic.header.bytes,
-            elements,
-            port,
-        })
-    }
-
-    /// Returns the number in the name of its shared memory.
-    pub(crate) fn id(&self) -> u128 {
-        self.port.id().value()
-    }
-
-    /// Loans a message of the longest payload. The header is zero; the payload is whatever is in
-    /// memory.
-    pub(crate) fn loan(&self) -> Result<Loan, StageError> {
-        // SAFETY: the topic's payload is a slice, so that any number of elements may be loaned.
-        let sample = unsafe { self.port.loan_custom_payload(self.elements) }
-            .map_err(|e| StageError::transport(format!("get memory for {}", self.topic), e))?;
-        let mut loan = Loan {
-            // SAFETY: any bytes of mapped memory are valid values of bytes.
-            sample: unsafe { sample.assume_init() },
-            header_bytes: self.header_bytes,
-        };
-        loan.header().fill(0);
-        Ok(loan)
-    }
-
-    /// Publishes a message without copying: readers receive its offset in shared memory.
-    pub(crate) fn send(&self, loan: Loan) -> Result<(), StageError> {
-        let sent = loan.sample.send();
-        sent.map(drop)
-            .map_err(|e| StageError::transport(format!("send {}", self.topic), e))
-    }
-
-    pub(crate) fn connect(&self) -> Result<(), StageError> {
-        self.port
-            .update_connections()
-            .map_err(|e| StageError::transport(format!("connect the readers of {}", self.topic), e))
-    }
-}
-
-impl Loan {
-    pub(crate) fn parts(&mut self) -> (&mut [u8], &mut [u8]) {
-        let header = std::ptr::from_mut(self.sample.user_header_mut()).cast::<u8>();
-        let payload = self.sample.payload_mut();
-        let (elements, bytes) = (payload.as_mut_ptr().cast::<u8>(), payload.len());
-        // SAFETY: the topic was opened with this size of headers, so that the sample has as many
-        // bytes there. `loan` has written them. An element of `AnyPayload` is one byte. Header and
-        // payload are disjoint parts of a sample that this loan owns.
-        unsafe {
-            (
-                slice::from_raw_parts_mut(header, self.header_bytes),
-                slice::from_raw_parts_mut(elements, bytes),
-            )
-        }
-    }
-
-    pub(crate) fn header(&mut self) -> &mut [u8] {
-        self.parts().0
-    }
-
-    /// Returns the item of the message's scan, which is at the start of every header.
-    pub(crate) fn item(&mut self) -> &mut Item {
-        bytemuck::from_bytes_mut(&mut self.header()[..size_of::<Item>()])
-    }
-}
 
 pub(crate) struct Subscriber {
     topic: &'static str,
