@@ -19,10 +19,10 @@ use crate::{
     heartbeat::HeartbeatWriter,
     message::{AnyMessage, RecordedMessage},
     numbers::{self, Numbers},
-    reader::{self, Port, Received},
+    reader::{self, Port, Received, Subscriber},
     run,
     sessions::not_running,
-    transport::{self, Node, Service, Subscriber},
+    transport::{self, Node, Service},
     wake::{self, Signals},
 };
 pub use sequence::Sequence;

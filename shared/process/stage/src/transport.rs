@@ -3,7 +3,7 @@
 //! and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other languages.
 
 mod event;
-mod port;
+pub mod reader;
 mod service;
 pub mod writer;
 
@@ -25,7 +25,6 @@ pub use event::Listener;
 #[cfg(test)]
 pub(crate) use event::bind_alone;
 pub(crate) use event::{Event, Notifier};
-pub(crate) use port::{Sample, Subscriber};
 pub use service::Service;
 
 type Ipc = ipc::Service;
