@@ -126,9 +126,9 @@ impl Stage for Masking {
         *header = self.header(twist, points);
         let azimuths = scan.header().azimuths as usize;
         header.azimuth_variance_rad2 = self.azimuths.last().variance_of_mean_rad2(azimuths);
-        header.set_turn(input.turn);
-        header.set_distance(input.distance);
-        header.set_velocity(velocity.flatten());
+        (header.gyro, header.has_gyro) = or_none(input.turn);
+        (header.wheels, header.has_wheels) = or_none(input.distance);
+        (header.doppler, header.has_doppler) = or_none(velocity.flatten());
         Ok(())
     }
 
@@ -156,6 +156,11 @@ impl Masking {
             ..MaskedHeader::default()
         }
     }
+}
+
+/// Returns a measurement as a message has it: zeros without one, and whether there is one.
+fn or_none<T: Copy + Default>(measured: Option<T>) -> (T, u64) {
+    (measured.unwrap_or_default(), measured.is_some().into())
 }
 
 /// Returns a scan whose rows are at their places.

@@ -188,19 +188,6 @@ impl MaskedHeader {
         (self.has_doppler == 1).then_some(self.doppler)
     }
 
-    pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
-        (self.gyro, self.has_gyro) = (turn.unwrap_or_default(), turn.is_some().into());
-    }
-
-    pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
-        (self.wheels, self.has_wheels) = (distance.unwrap_or_default(), distance.is_some().into());
-    }
-
-    pub fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
-        (self.doppler, self.has_doppler) =
-            (velocity.unwrap_or_default(), velocity.is_some().into());
-    }
-
     /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too
     /// short.
     pub fn split<'a>(values: &'a mut [f32], n: usize, rasters: usize) -> Option<MaskedParts<'a>> {

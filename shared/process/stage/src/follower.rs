@@ -57,7 +57,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     let mut flow = Flow {
         output: Writer::open(&launch.node, &launch.manifest)?,
         report: Numbers::open(&launch.manifest, &file_of(&launch.name))?,
-        delay: launch.delay(),
+        delay: launch.delay()?,
         next_seq: 0,
         counters: StageCounters::default(),
     };

@@ -43,7 +43,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, St
         signals: &launch.signals,
         inputs,
         output,
-        delay: launch.delay(),
+        delay: launch.delay()?,
         last: None,
         ended: false,
         counters: StageCounters::default(),

@@ -51,12 +51,11 @@ pub(crate) struct Child {
 impl Child {
     pub fn spawn(
         plan: &StagePlan,
-        manifest: &Manifest,
         starter: &Starter<'_>,
         position: Position,
     ) -> Result<Self, SuperviseError> {
-        let log = Log::open(manifest, &plan.name)?;
-        let process = starter.start(plan, manifest, log.output(), position)?;
+        let log = Log::open(starter.manifest, &plan.name)?;
+        let process = starter.start(plan, log.output(), position)?;
         Ok(Self {
             plan: plan.clone(),
             process,
@@ -75,7 +74,6 @@ impl Child {
 
     pub fn respawn(
         &mut self,
-        manifest: &Manifest,
         starter: &Starter<'_>,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
@@ -86,7 +84,7 @@ impl Child {
                 path.display()
             )));
         }
-        self.process = starter.start(&self.plan, manifest, self.log.output(), Position::Free)?;
+        self.process = starter.start(&self.plan, self.log.output(), Position::Free)?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);

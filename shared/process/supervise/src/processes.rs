@@ -38,7 +38,7 @@ impl Processes {
     pub fn start(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
         let plan = run.plan;
         for stage in &plan.stages {
-            let child = Child::spawn(stage, &plan.manifest, &run.starter(), Position::Free)?;
+            let child = Child::spawn(stage, &run.starter(), Position::Free)?;
             run.note(&format!("{:20} pid {}", stage.name, child.pid()));
             self.children.push(child);
         }

@@ -39,7 +39,7 @@ impl Recorder {
         let Some(plan) = &run.plan.recorder else {
             return Ok(None);
         };
-        let mut child = match Child::spawn(plan, run.manifest(), &run.starter(), Position::Free) {
+        let mut child = match Child::spawn(plan, &run.starter(), Position::Free) {
             Err(SuperviseError::Process(reason)) => {
                 run.note(&reason);
                 return Ok(None);
@@ -95,7 +95,7 @@ impl Recorder {
     fn respawn(&mut self, run: &mut Run<'_>, newest: Option<u64>) -> Result<(), SuperviseError> {
         self.has_ended = false;
         self.restarts += 1;
-        let respawned = self.child.respawn(run.manifest(), &run.starter(), newest);
+        let respawned = self.child.respawn(&run.starter(), newest);
         match respawned {
             Err(SuperviseError::Process(reason)) => {
                 self.has_ended = true;

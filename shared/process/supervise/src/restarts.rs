@@ -138,8 +138,8 @@ impl Supervisor<'_> {
     fn respawn(&mut self, process: usize) -> Result<(), SuperviseError> {
         let newest = self.poses.newest_seq();
         loop {
-            let (manifest, starter) = (self.run.manifest(), self.run.starter());
-            match self.processes[process].respawn(manifest, &starter, newest) {
+            let starter = self.run.starter();
+            match self.processes[process].respawn(&starter, newest) {
                 Err(SuperviseError::Process(reason)) => {
                     if !self.go_back(process, &reason) {
                         return Err(SuperviseError::Process(reason));

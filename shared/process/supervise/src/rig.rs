@@ -107,9 +107,13 @@ impl<'a> Rig<'a> {
             scheduling: scheduling.clone(),
             ..StagePlan::new(name, command.to_vec())
         };
-        let starter = Starter::new(self.signals, &self.guardian);
+        let starter = Starter {
+            manifest: &self.manifest,
+            signals: self.signals,
+            guardian: &self.guardian,
+        };
         Ok(Process {
-            child: Child::spawn(&plan, &self.manifest, &starter, Position::Free)?,
+            child: Child::spawn(&plan, &starter, Position::Free)?,
             death: None,
         })
     }

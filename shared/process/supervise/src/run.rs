@@ -62,7 +62,11 @@ impl<'a> Run<'a> {
     }
 
     pub fn starter(&self) -> Starter<'_> {
-        Starter::new(&self.signals, &self.guardian)
+        Starter {
+            manifest: self.manifest(),
+            signals: &self.signals,
+            guardian: &self.guardian,
+        }
     }
 
     pub fn say(&mut self, event: Event<'_>) {

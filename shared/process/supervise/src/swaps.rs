@@ -72,7 +72,7 @@ impl Swaps {
     ) -> Result<(), SuperviseError> {
         let manifest = run.manifest();
         let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
-        match Child::spawn(plan, manifest, &run.starter(), Position::Taken) {
+        match Child::spawn(plan, &run.starter(), Position::Taken) {
             Ok(child) => {
                 self.standby = Some(Standby {
                     process,
