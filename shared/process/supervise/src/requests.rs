@@ -175,7 +175,14 @@ impl Supervisor<'_> {
     }
 
     pub(crate) fn give_up(&self, standby: Standby, reason: &str) {
-        let pid = standby.give_up(reason);
+        let Standby { child, client, .. } = standby;
+        let (name, command) = (child.name(), child.plan.command.join(" "));
+        client.answer(&Answer::Refused(format!(
+            "{name} continues as before, since `{command}` cannot take over: {reason}"
+        )));
+        let pid = child.pid();
+        // Its end is waited for.
+        drop(child);
         self.run.guardian.forget(pid);
     }
 
@@ -187,7 +194,7 @@ impl Supervisor<'_> {
             self.give_up(standby, &reason);
             return Ok(());
         }
-        let (child, client) = standby.into_parts(self.run.manifest());
+        let Standby { child, client, .. } = standby;
         self.processes[process].kill();
         self.processes[process].await_end()?;
         // If the one before has left no scan without a pose, the one after it numbers scans as it
