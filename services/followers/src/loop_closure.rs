@@ -15,7 +15,7 @@ use gyre_slam::{
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
-    follower::{self, Growth, LogId, Progress, Step},
+    follower::{self, LogId, Notifier, Progress, Step},
 };
 
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
@@ -32,7 +32,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     };
     let out = &launch.manifest.out;
     let mut closing = LoopClosing {
-        growth: Growth::of(launch, LogId::Loops)?,
+        growth: LogId::Loops.growth(launch)?,
         keyframes: RecordReader::open(out)?,
         places: RecordLog::open(out)?,
         queries: RecordLog::open(out)?,
@@ -50,7 +50,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 /// The logs, and what follows from the records read so far.
 struct LoopClosing {
     /// Wakes the readers of the queries.
-    growth: Growth,
+    growth: Notifier,
     keyframes: RecordReader<Keyframe>,
     places: RecordLog<Place>,
     queries: RecordLog<Query>,

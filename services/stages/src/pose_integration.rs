@@ -8,7 +8,7 @@ use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{
     Launch, Manifest, Sink, StageCounters, StageError, clock,
-    follower::{Growth, LogId},
+    follower::{LogId, Notifier},
     reader::Received,
     sink,
 };
@@ -28,14 +28,14 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let (newest, ended) = journal.last(1).map_err(unusable)?;
     let last = newest.last().copied();
     let known = last.map_or(0, |last| last.item.seq.saturating_add(1));
-    let mut logs: Vec<(Box<dyn PoseLog>, Growth)> = Vec::new();
+    let mut logs: Vec<(Box<dyn PoseLog>, Notifier)> = Vec::new();
     if slam.is_on() {
         let keyframes = Keyframes::open(out, known, ended).map_err(unusable)?;
-        logs.push((Box::new(keyframes), Growth::of(launch, LogId::Keyframes)?));
+        logs.push((Box::new(keyframes), LogId::Keyframes.growth(launch)?));
     }
     if objects.is_on() {
         let scans = Scans::open(out, known, ended).map_err(unusable)?;
-        logs.push((Box::new(scans), Growth::of(launch, LogId::Scans)?));
+        logs.push((Box::new(scans), LogId::Scans.growth(launch)?));
     }
     let points = launch.manifest.limits.points;
     logs.iter_mut().for_each(|(log, _)| log.reserve(points));
@@ -57,7 +57,7 @@ struct Integration {
     journal: Journal,
     last: Option<PoseHeader>,
     /// The logs that the run has, and what wakes the followers of each.
-    logs: Vec<(Box<dyn PoseLog>, Growth)>,
+    logs: Vec<(Box<dyn PoseLog>, Notifier)>,
     manifest: Manifest,
     /// The sentence about the poses that are not kept.
     loss: Option<String>,

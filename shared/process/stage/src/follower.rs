@@ -6,7 +6,7 @@ use std::{thread, time::Duration};
 
 use gyre_messages::{Header, Item, Message};
 
-pub use crate::log_id::{Growth, LogId};
+pub use crate::transport::Notifier;
 use crate::{
     Launch, Listener, Manifest, StageCounters, StageError,
     counters::Work,
@@ -17,6 +17,24 @@ use crate::{
 
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
+
+gyre_messages::named! {
+    /// A log of a run that followers read; its name is the event of its growth.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum LogId {
+        Keyframes = "keyframes_grown",
+        Loops = "loops_grown",
+        /// All scans with their points, by pose-integration.
+        Scans = "scans_grown",
+    }
+}
+
+impl LogId {
+    /// Opens the event that wakes the followers of the log, as the one process that appends to it.
+    pub fn growth(self, launch: &Launch) -> Result<Notifier, StageError> {
+        Notifier::open(&launch.node, self.name())
+    }
+}
 
 pub trait Follower {
     type Output: Message;

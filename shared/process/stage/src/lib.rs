@@ -24,7 +24,6 @@ mod gnss_receiver;
 pub mod heartbeat;
 pub mod inputs;
 pub mod launch;
-mod log_id;
 mod manifest;
 pub mod message;
 mod numbers;

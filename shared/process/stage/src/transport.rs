@@ -21,10 +21,10 @@ use iceoryx2::{
 
 use crate::{Manifest, StageError};
 
-pub use event::Listener;
+pub(crate) use event::Event;
 #[cfg(test)]
 pub(crate) use event::bind_alone;
-pub(crate) use event::{Event, Notifier};
+pub use event::{Listener, Notifier};
 pub use service::Service;
 
 type Ipc = ipc::Service;

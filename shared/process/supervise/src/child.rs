@@ -2,6 +2,7 @@
 
 use std::{
     collections::VecDeque,
+    fmt,
     os::unix::process::ExitStatusExt,
     process::ExitStatus,
     time::{Duration, Instant},
@@ -10,15 +11,17 @@ use std::{
 use gyre_messages::StageId;
 use gyre_stage::{
     Manifest, StageError,
+    control::{Activity, ProcessStatus},
     heartbeat::{self, Heartbeat},
     run::SHARED_MEMORY,
 };
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use crate::{
-    Death, StagePlan, SuperviseError,
+    StagePlan, SuperviseError,
     end::ends_within,
     log::Log,
+    run::Run,
     start::{Position, Starter},
 };
 
@@ -150,6 +153,35 @@ impl Child {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
+    /// Returns its state as `gyre ps` shows it; its activity is `otherwise` if it writes no
+    /// heartbeat.
+    pub fn status(&self, run: &Run<'_>, otherwise: Activity) -> ProcessStatus {
+        let beat = self.heartbeat(run.manifest());
+        let activity = match beat {
+            _ if self.is_known_to_have_exited() => Activity::Ended,
+            _ if run.is_starting(self) => Activity::Starting,
+            None => otherwise,
+            Some(beat) if beat.is_silent() => Activity::Silent,
+            Some(beat) => match beat.activity {
+                heartbeat::Activity::Works => Activity::Working,
+                heartbeat::Activity::Waits => Activity::Waiting,
+            },
+        };
+        ProcessStatus {
+            name: self.name().to_owned(),
+            pid: self.pid(),
+            command: self.plan.command.clone(),
+            is_swapped: false,
+            activity,
+            activity_s: beat.map(|beat| beat.age().as_secs_f64()),
+            uptime_s: self.started.elapsed().as_secs_f64(),
+            restarts: 0,
+            last_death: self.last_death.clone(),
+            missed: None,
+            received: None,
+        }
+    }
+
     pub fn has_outlived_its_window(&self) -> bool {
         self.started.elapsed() > RESTART_WINDOW
     }
@@ -261,6 +293,33 @@ impl Child {
     /// Returns the last line of its output since the last call: the reason that it gave.
     pub fn last_output(&mut self) -> Option<String> {
         self.log.last_line()
+    }
+}
+
+#[derive(Clone, Debug)]
+pub struct Death {
+    pub killed: bool,
+    /// The cause, as `signal 9` or `exit code 3`.
+    pub cause: String,
+    pub code: Option<i32>,
+    pub last_output: Option<String>,
+}
+
+impl Death {
+    pub(crate) fn output(&self) -> String {
+        let line = self.last_output.as_ref();
+        line.map_or_else(String::new, |line| format!(" ({line})"))
+    }
+}
+
+/// The end of a sentence, as `it ended with exit code 3, its last line: ...`.
+impl fmt::Display for Death {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "it ended with {}", self.cause)?;
+        match &self.last_output {
+            Some(line) => write!(f, ", its last line: {line}"),
+            None => Ok(()),
+        }
     }
 }
 

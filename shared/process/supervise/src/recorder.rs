@@ -12,7 +12,6 @@ use gyre_stage::{
 use crate::{
     Ending, Event, SuperviseError,
     child::{Child, RESTART_BACKOFF},
-    process_status::status_of,
     run::Run,
     start::Position,
 };
@@ -136,7 +135,7 @@ impl Recorder {
             restarts: self.restarts,
             missed: Some(observer::read_missed(root, self.child.pid())),
             // It beats from when it observes all topics.
-            ..status_of(&self.child, run, Activity::Starting)
+            ..self.child.status(run, Activity::Starting)
         }
     }
 

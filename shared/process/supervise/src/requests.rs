@@ -14,7 +14,6 @@ use gyre_stage::{
 use crate::{
     StagePlan, SuperviseError,
     child::Child,
-    process_status::status_of,
     socket::{Client, ControlSocket},
     supervisor::Supervisor,
     swaps::{Standby, Step, plan_of},
@@ -227,7 +226,7 @@ impl Supervisor<'_> {
                 is_swapped: child.plan.command != begun.command,
                 restarts: restarts.copied().unwrap_or_default(),
                 received: is_source.then(|| received_of(manifest)).flatten(),
-                ..status_of(child, &self.run, Activity::Running)
+                ..child.status(&self.run, Activity::Running)
             }
         };
         let begun = &self.run.plan.stages;

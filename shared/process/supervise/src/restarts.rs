@@ -6,9 +6,8 @@ use gyre_stage::clock;
 
 use crate::{
     Event, Stall, SuperviseError,
-    child::{Child, RESTART_BACKOFF},
+    child::{Child, Death, RESTART_BACKOFF},
     clean,
-    death::Death,
     followers::Patience,
     recovery::restarted_after,
     supervisor::Supervisor,

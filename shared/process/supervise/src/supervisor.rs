@@ -17,8 +17,9 @@ use gyre_run::Report;
 use crate::{
     Ending, Event, Plan, SuperviseError,
     child::Child,
+    clean,
     followers::Followers,
-    log, observers,
+    log,
     poses::Poses,
     processes::Processes,
     recorder::Recorder,
@@ -117,7 +118,7 @@ impl<'a> Supervisor<'a> {
             self.keep_house()?;
             if Instant::now() >= self.sweep_due {
                 let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
-                self.sweep_due = observers::sweep(&self.run, own);
+                self.sweep_due = clean::sweep_observers(&self.run, own);
             }
             let (followers, stages) = self.processes.ended(self.run.plan);
             self.recover_followers(&followers)?;
