@@ -30,7 +30,6 @@ mod numbers;
 pub mod observer;
 pub mod python_function;
 pub mod relay;
-pub mod remote_progress;
 pub mod run;
 pub mod schedule;
 pub mod services;

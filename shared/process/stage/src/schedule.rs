@@ -2,6 +2,8 @@
 //! supervisor reads it, since only the source can distinguish a gap in the recording from a source
 //! that hangs. And the origin of its pace, for the source after it: scans of a live run become due
 //! whether a source is there or not.
+//!
+//! And the progress of stages on another machine: while those owe something, nobody here does.
 
 use crate::{
     Manifest, StageError, clock,
@@ -83,4 +85,21 @@ pub fn read(manifest: &Manifest) -> Option<Schedule> {
         published,
         due_ns: due_ns as i64,
     })
+}
+
+/// The name of the file in the run's root: one more than `Item::published` of the newest item that
+/// was handed over.
+const ELSEWHERE: &str = "elsewhere";
+
+/// Begins without the other machine, which has not reported where it continues.
+pub(crate) fn begin_elsewhere(manifest: &Manifest) -> Result<Numbers<1>, StageError> {
+    let mut file = Numbers::open(manifest, ELSEWHERE)?;
+    file.write([u64::MAX])?;
+    Ok(file)
+}
+
+/// Returns whether stages on another machine owe the pose of an item that was handed over to them,
+/// after so many poses.
+pub fn owes(manifest: &Manifest, poses: u64) -> bool {
+    numbers::read(&manifest.root.join(ELSEWHERE)).is_some_and(|[items]| items > poses)
 }

@@ -26,7 +26,6 @@ mod recovery;
 mod requests;
 mod restarts;
 pub mod rig;
-mod roles;
 mod run;
 mod scheduling;
 mod socket;

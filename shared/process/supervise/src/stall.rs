@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 
 use gyre_messages::Item;
 use gyre_stage::{
-    remote_progress,
     schedule::{self, Schedule},
     wake,
 };
@@ -109,7 +108,7 @@ impl<'a> Stalls<'a> {
 
     fn late_message(&mut self) -> Option<Stall> {
         let limit = self.plan.stall_timeout?;
-        let owed = match remote_progress::owes(&self.plan.manifest, self.poses) {
+        let owed = match schedule::owes(&self.plan.manifest, self.poses) {
             true => None,
             false => self.owed_by(schedule::read(&self.plan.manifest), limit),
         };
