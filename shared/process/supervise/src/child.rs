@@ -249,7 +249,6 @@ impl Child {
         };
         self.last_death = Some(cause.clone());
         Death {
-            killed: status.signal().is_some(),
             cause,
             code: status.code(),
             last_output: self.last_output(),
@@ -298,9 +297,9 @@ impl Child {
 
 #[derive(Clone, Debug)]
 pub struct Death {
-    pub killed: bool,
     /// The cause, as `signal 9` or `exit code 3`.
     pub cause: String,
+    /// `None`: it was killed.
     pub code: Option<i32>,
     pub last_output: Option<String>,
 }

@@ -45,7 +45,7 @@ impl Supervisor<'_> {
             let (name, output) = (child.name(), death.output());
             self.run
                 .note(&format!("{name} died by {}{output}", death.cause));
-            if !death.killed {
+            if death.code.is_some() {
                 backoff = backoff.max(RESTART_BACKOFF);
                 if !child.is_on_trial {
                     failure = Some(format!("{name} died after it: {death}"));
