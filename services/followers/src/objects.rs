@@ -27,7 +27,10 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         masking,
         read: 0,
     };
-    tracking.leave_out_what_was_cut()?;
+    let (scans, tracked) = (&tracking.scans, &mut tracking.tracked);
+    if !scans.has_ended() || tracked.len() > scans.len() {
+        tracked.cut(scans.len())?;
+    }
     follower::run(launch, &mut tracking)
 }
 
@@ -53,13 +56,6 @@ impl Tracking {
             self.tracked.cut(self.scans.unchanged())?;
             self.tracker = tracker(&self.masking)?;
             self.read = 0;
-        }
-        Ok(())
-    }
-
-    fn leave_out_what_was_cut(&mut self) -> Result<(), StageError> {
-        if !self.scans.has_ended() || self.tracked.len() > self.scans.len() {
-            self.tracked.cut(self.scans.len())?;
         }
         Ok(())
     }

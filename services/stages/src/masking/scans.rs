@@ -70,10 +70,10 @@ impl Inputs for Scans {
         self.motions.update()?;
         // The newest pose decides which scans are still needed, and in live mode where the chain
         // resumes.
-        let Some(resume_at) = self.motions.resume_at else {
+        let Some(resume_at) = self.motions.credit.resume_at else {
             return Ok(Action::Wait);
         };
-        let newest_pose = self.motions.newest_pose;
+        let newest_pose = self.motions.credit.newest;
         let action = self.queue.next_action(&resume_at, newest_pose)?;
         match action {
             Action::Process(item, _) if !self.find_motions(&item) => return Ok(Action::Wait),
@@ -111,7 +111,7 @@ impl Inputs for Scans {
     fn listeners(&self) -> Vec<&Listener> {
         let scans = self.queue.listener();
         // Motions and poses are read when a scan comes.
-        if self.queue.current().is_none() && self.motions.resume_at.is_some() {
+        if self.queue.current().is_none() && self.motions.credit.resume_at.is_some() {
             return vec![scans];
         }
         let [motions, poses] = self.motions.listeners();

@@ -34,7 +34,7 @@ pub struct Launch {
     pub manifest: Manifest,
     pub signals: Signals,
     configuration: toml::Table,
-    pub(crate) node: Node,
+    pub node: Node,
     has_place: Cell<bool>,
     _log: EnteredSpan,
 }
@@ -158,10 +158,6 @@ impl Launch {
 
     pub fn has_section(&self, section: &str) -> bool {
         self.configuration.contains_key(section)
-    }
-
-    pub fn node(&self) -> &Node {
-        &self.node
     }
 }
 

@@ -22,6 +22,7 @@ use gyre_messages::{ScanHeader, StageId};
 use gyre_run::SourceConfig;
 
 use crate::{Launch, StageCounters, StageError};
+pub use feed::Credit;
 pub(crate) use feed::{Feed, hop};
 use pace::Pace;
 use playback::Playback;

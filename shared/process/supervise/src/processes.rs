@@ -52,11 +52,7 @@ impl Processes {
         ended.partition(|i| plan.follows(*i))
     }
 
-    pub fn are_ready(&self, run: &Run<'_>) -> bool {
-        let mut stages = self.iter().filter(|child| child.stage().is_some());
-        stages.all(|stage| !run.is_starting(stage))
-    }
-
+    /// Returns the stage that has been opening its topics for longest.
     pub fn starting(&self, run: &Run<'_>) -> Option<&Child> {
         let opening = self.iter().filter(|child| run.is_starting(child));
         opening.min_by_key(|child| child.started)

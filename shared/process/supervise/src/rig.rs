@@ -199,7 +199,7 @@ impl Process {
 impl Feed {
     /// Publishes a topic of the run that a process has joined.
     pub fn of(launch: &Launch, topic: &str) -> Result<Self, StageError> {
-        Self::on(launch.node(), &launch.manifest, topic)
+        Self::on(&launch.node, &launch.manifest, topic)
     }
 
     fn on(node: &Node, manifest: &Manifest, topic: &str) -> Result<Self, StageError> {
@@ -236,7 +236,7 @@ impl Tap {
     /// Subscribes to a topic of the run that a process has joined; `silently`, it does not ask for
     /// its history.
     pub fn of(launch: &Launch, topic: &str, silently: bool) -> Result<Self, StageError> {
-        let (topic, node, manifest) = (known(topic)?, launch.node(), &launch.manifest);
+        let (topic, node, manifest) = (known(topic)?, &launch.node, &launch.manifest);
         let port = match silently {
             true => Port::silent(topic, node, manifest)?,
             false => Port::to(topic, node, manifest)?,

@@ -110,7 +110,7 @@ impl<'a> Supervisor<'a> {
             }
             self.swaps.continue_trial(&self.processes, &self.run);
             self.continue_swap()?;
-            if !self.is_ready && self.processes.are_ready(&self.run) {
+            if !self.is_ready && self.processes.starting(&self.run).is_none() {
                 self.is_ready = true;
                 self.run.say(Event::Ready);
             }
