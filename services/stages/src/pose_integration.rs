@@ -28,17 +28,16 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let (newest, ended) = journal.last(1).map_err(unusable)?;
     let last = newest.last().copied();
     let known = last.map_or(0, |last| last.item.seq.saturating_add(1));
+    let points = launch.manifest.limits.points;
     let mut logs: Vec<(Box<dyn PoseLog>, Notifier)> = Vec::new();
     if slam.is_on() {
-        let keyframes = Keyframes::open(out, known, ended).map_err(unusable)?;
+        let keyframes = Keyframes::open(out, known, ended, points).map_err(unusable)?;
         logs.push((Box::new(keyframes), LogId::Keyframes.growth(launch)?));
     }
     if objects.is_on() {
-        let scans = Scans::open(out, known, ended).map_err(unusable)?;
+        let scans = Scans::open(out, known, ended, points).map_err(unusable)?;
         logs.push((Box::new(scans), LogId::Scans.growth(launch)?));
     }
-    let points = launch.manifest.limits.points;
-    logs.iter_mut().for_each(|(log, _)| log.reserve(points));
     let mut integration = Integration {
         journal,
         last,

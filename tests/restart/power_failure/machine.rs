@@ -162,7 +162,9 @@ impl Stages {
         let last = poses.pop();
         let slam = &configuration.slam;
         let poses = last.map_or(0, |last| last.item.seq + 1);
-        let keyframes = slam.is_on().then(|| Keyframes::open(out, poses, ended));
+        let keyframes = slam
+            .is_on()
+            .then(|| Keyframes::open(out, poses, ended, POINTS));
         Ok(Self {
             refiner,
             checkpoint,

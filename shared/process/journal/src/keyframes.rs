@@ -20,8 +20,10 @@ impl Keyframes {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Keyframes beyond them are cut off, and the motion since
     /// the last one is recovered from the journal.
-    pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, JournalError> {
+    /// Appending allocates nothing for scans of up to `points` points.
+    pub fn open(out: &Path, poses: u64, ended: bool, points: usize) -> Result<Self, JournalError> {
         let mut log = RecordLog::open(out)?;
+        log.reserve(Keyframe::encoded_len(points));
         let (keyframes, last) = newest(log.len(), poses, |index| log.read(index))?;
         // The end of the keyframes is before the end of the journal.
         if !ended {
@@ -31,7 +33,7 @@ impl Keyframes {
             (builder, None) => Ok(Self {
                 log,
                 builder,
-                points: Vec::new(),
+                points: Vec::with_capacity(points),
             }),
             (_, Some(pose)) => {
                 let path = records_path::<Keyframe>(out);
@@ -45,11 +47,6 @@ impl Keyframes {
 }
 
 impl PoseLog for Keyframes {
-    fn reserve(&mut self, points: usize) {
-        self.points.reserve(points);
-        self.log.reserve(Keyframe::encoded_len(points));
-    }
-
     /// Appends the pose if it becomes a keyframe.
     fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError> {
         let Some(mut keyframe) = self.builder.next(&scan_pose(pose)) else {

@@ -41,9 +41,6 @@ pub struct Journal {
 
 /// A log of poses with the points of their scans, each appended before its pose is journalled.
 pub trait PoseLog {
-    /// Allocates the memory for records of up to `points` points: later appends allocate nothing.
-    fn reserve(&mut self, points: usize);
-
     /// Takes the next pose, before it is journalled. Returns whether it was appended.
     fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError>;
 

@@ -164,10 +164,6 @@ pub fn progress_of(manifest: &Manifest, follower: &str) -> Option<(Progress, boo
     Some((Progress { done, total }, ended == 1))
 }
 
-pub fn is_done(manifest: &Manifest, follower: &str) -> bool {
-    progress_of(manifest, follower).is_some_and(|(_, has_ended)| has_ended)
-}
-
 fn file_of(follower: &str) -> String {
     format!("{follower}.progress")
 }

@@ -70,7 +70,7 @@ impl<'a> Followers<'a> {
 
     /// Returns whether a process is a follower that has not come to its end, and may still do so.
     pub fn is_behind(&self, process: usize) -> bool {
-        let is_done = || follower::is_done(&self.plan.manifest, self.plan.name(process));
+        let is_done = || self.progress_of(process).1;
         self.plan.follows(process) && !self.has_given_up(process) && !is_done()
     }
 
@@ -90,9 +90,10 @@ impl<'a> Followers<'a> {
         }
     }
 
-    pub fn progress_of(&self, follower: usize) -> Progress {
-        follower::progress_of(&self.plan.manifest, self.plan.name(follower))
-            .map_or_else(Progress::default, |(progress, _)| progress)
+    /// Returns the progress of a follower, and whether it has come to its end.
+    pub fn progress_of(&self, follower: usize) -> (Progress, bool) {
+        let name = self.plan.name(follower);
+        follower::progress_of(&self.plan.manifest, name).unwrap_or_default()
     }
 
     pub fn judge(&mut self, follower: usize, progress: Progress, started: Instant) -> Patience {

@@ -209,7 +209,7 @@ impl Supervisor<'_> {
     /// A follower that has stayed for too long is started again as after a death.
     pub(crate) fn end_stuck_follower(&mut self, follower: usize) -> Result<(), SuperviseError> {
         let child = &mut self.processes[follower];
-        let progress = self.followers.progress_of(follower);
+        let (progress, _) = self.followers.progress_of(follower);
         self.run.say(Event::Following {
             follower: child.name(),
             progress,
