@@ -179,7 +179,7 @@ impl<M> Port<M> {
         };
         match (self.topic.check)(received.header_bytes(), received.payload(), &self.limits) {
             Ok(()) => Ok(Some(received)),
-            Err(violation) => Err(received.malformed(violation.to_string())),
+            Err(violation) => Err(received.malformed(violation)),
         }
     }
 
