@@ -90,7 +90,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
             follower.sync()?;
             return Ok(flow.counters);
         }
-        if woken.may_have_new_readers() {
+        if woken.may_have_new_readers {
             flow.output.accept_readers()?;
         }
         let slept = !limit.is_zero();

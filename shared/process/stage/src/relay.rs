@@ -200,7 +200,7 @@ impl<'a> LastStages<'a> {
         let woken =
             signals.wait_or_readable(&data, &handshakes, Some(connection), wake::MAX_WAIT)?;
         self.counters.wakes += 1;
-        if woken.may_have_new_readers() {
+        if woken.may_have_new_readers {
             self.poses.accept_readers()?;
             let motions = self.motions.as_ref();
             motions.map_or(Ok(()), |motions| motions.accept_readers())?;

@@ -78,7 +78,7 @@ pub fn run<S: Sink>(launch: &Launch, sink: &mut S) -> Result<StageCounters, Stag
             integration.counters.duplicates = integration.motions.duplicates + of_scans;
             return Ok(integration.counters);
         }
-        if woken.may_have_new_readers() {
+        if woken.may_have_new_readers {
             integration.poses.accept_readers()?;
         }
         if integration.drain()? && woken.timed_out {

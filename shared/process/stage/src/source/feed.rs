@@ -136,7 +136,7 @@ impl<'a, M> Feed<'a, M> {
         let limit = limit.min(wake::MAX_WAIT);
         let woken = signals.wait_or_readable(&data, &handshakes, connections, limit)?;
         self.counters.wakes += 1;
-        self.may_have_new_readers = woken.may_have_new_readers();
+        self.may_have_new_readers = woken.may_have_new_readers;
         match woken.stop {
             true => Err(StageError::Stopped),
             false => Ok(()),
