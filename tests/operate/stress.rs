@@ -11,7 +11,7 @@ use std::{
 
 use gyre_simulator::{GyroProfile, Profile, SimulationConfig};
 use gyre_stage::control::Control;
-use gyre_supervise::{Usage, memory::Room};
+use gyre_supervise::{Usage, memory};
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -345,7 +345,7 @@ fn a_load_takes_no_more_memory_than_it_is_asked_for_and_is_none_without_any() {
     load.kill().unwrap();
     load.wait().unwrap();
     assert_eq!(said, "ready\n");
-    let most = Room::now().least().unwrap() / 50 + (100 << 20);
+    let most = memory::left().unwrap() / 50 + (100 << 20);
     assert!(taken <= most, "{taken} bytes of {most}");
     let nothing = helper(r#"{"memory":0.0}"#);
     Ended::of(nothing).failed_with(&["no memory was taken", "are always left"]);

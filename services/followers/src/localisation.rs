@@ -1,8 +1,6 @@
 //! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
 //! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map.
 
-use std::path::PathBuf;
-
 use gyre_geometry::{covariance, xy_yaw};
 use gyre_messages::{Fix, FixHeader, Item, fix_status};
 use gyre_radar::points::PointsConfig;
@@ -21,18 +19,15 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let map = Map::open(&slam.map).map_err(StageError::input)?;
     let localiser = Localiser::new(map, &refinement, points.capacity);
     launch.take_place()?;
-    let out = launch.manifest.out.clone();
     let mut places = Fixes {
-        keyframes: RecordReader::open(&out)?,
+        keyframes: RecordReader::open(&launch.manifest.out)?,
         localiser: localiser.map_err(StageError::input)?,
         read: 0,
-        out,
     };
     follower::run(launch, &mut places)
 }
 
 struct Fixes {
-    out: PathBuf,
     keyframes: RecordReader<Keyframe>,
     localiser: Localiser,
     read: usize,
@@ -44,7 +39,6 @@ impl Fixes {
     fn look(&mut self) -> Result<(), StageError> {
         self.keyframes.refresh()?;
         if self.keyframes.unchanged() < self.read {
-            self.keyframes = RecordReader::open(&self.out)?;
             self.localiser.reset();
             self.read = 0;
         }

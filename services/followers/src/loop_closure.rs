@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 
 use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
-use gyre_journal::loops::loop_header;
+use gyre_journal::loops::loops_of;
 use gyre_messages::{Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
@@ -14,7 +14,7 @@ use gyre_slam::{
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
-    follower::{self, Growth, LogId, Progress, Step},
+    follower::{self, LogId, Notifier, Progress, Step},
 };
 
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
@@ -31,7 +31,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     };
     let out = &launch.manifest.out;
     let mut closing = LoopClosing {
-        growth: Growth::of(launch, LogId::Loops)?,
+        growth: LogId::Loops.growth(launch)?,
         keyframes: RecordReader::open(out)?,
         places: RecordLog::open(out)?,
         queries: RecordLog::open(out)?,
@@ -49,7 +49,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 /// The logs, and what follows from the records read so far.
 struct LoopClosing {
     /// Wakes the readers of the queries.
-    growth: Growth,
+    growth: Notifier,
     keyframes: RecordReader<Keyframe>,
     places: RecordLog<Place>,
     queries: RecordLog<Query>,
@@ -117,20 +117,11 @@ impl LoopClosing {
         }
         (self.loops, self.has_finished) = (0, false);
         self.pending.clear();
-        let mut last = None;
         for index in 0..self.queries.len() {
             let query = self.queries.read(index)?;
-            let loops = query.loops().count() as u64;
-            if loops > 0 {
-                last = Some((self.loops, query));
-            }
-            self.loops += loops;
-        }
-        if let Some((before, query)) = last {
-            // An observer that comes now receives the last one.
-            self.loops = before;
             self.note(&query)?;
-            self.pending.drain(..self.pending.len() - 1);
+            // An observer that comes now receives the last one.
+            self.pending.drain(..self.pending.len().saturating_sub(1));
         }
         self.closer.restore_queries(self.queries.len());
         Ok(())
@@ -186,13 +177,9 @@ impl LoopClosing {
 
     /// Counts the loops of a query, which are to be published.
     fn note(&mut self, query: &Query) -> Result<(), StageError> {
-        for (candidate, _) in query.loops() {
-            let ends = [query.keyframe, candidate.place];
-            let [later, earlier] = ends.map(|index| self.keyframes.read(index));
-            let header = loop_header(self.loops, &later?, &earlier?, candidate);
-            self.loops += 1;
-            self.pending.push_back(header);
-        }
+        let found = loops_of(query, self.loops, &mut self.keyframes)?;
+        self.loops += found.len() as u64;
+        self.pending.extend(found);
         Ok(())
     }
 }

@@ -2,8 +2,6 @@
 //! `journal/objects.log`. A restarted process works through the scans from the first one, since an
 //! identity can be as old as the run, and appends the records that the log lacks.
 
-use std::path::PathBuf;
-
 use gyre_geometry::xy_yaw;
 use gyre_journal::{
     objects::{LoggedObjects, listed},
@@ -21,16 +19,18 @@ use gyre_stage::{
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let masking: MaskingConfig = launch.section("masking")?;
-    let out = launch.manifest.out.clone();
+    let out = &launch.manifest.out;
     let mut tracking = Tracking {
-        scans: RecordReader::open(&out)?,
-        tracked: RecordLog::open(&out)?,
+        scans: RecordReader::open(out)?,
+        tracked: RecordLog::open(out)?,
         tracker: tracker(&masking)?,
         masking,
-        out,
         read: 0,
     };
-    tracking.leave_out_what_was_cut()?;
+    let (scans, tracked) = (&tracking.scans, &mut tracking.tracked);
+    if !scans.has_ended() || tracked.len() > scans.len() {
+        tracked.cut(scans.len())?;
+    }
     follower::run(launch, &mut tracking)
 }
 
@@ -40,7 +40,6 @@ pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, StageError> {
 }
 
 struct Tracking {
-    out: PathBuf,
     masking: MaskingConfig,
     scans: RecordReader<LoggedScan>,
     tracked: RecordLog<LoggedObjects>,
@@ -55,16 +54,8 @@ impl Tracking {
         self.scans.refresh()?;
         if self.scans.unchanged() < self.read {
             self.tracked.cut(self.scans.unchanged())?;
-            self.scans = RecordReader::open(&self.out)?;
             self.tracker = tracker(&self.masking)?;
             self.read = 0;
-        }
-        Ok(())
-    }
-
-    fn leave_out_what_was_cut(&mut self) -> Result<(), StageError> {
-        if !self.scans.has_ended() || self.tracked.len() > self.scans.len() {
-            self.tracked.cut(self.scans.len())?;
         }
         Ok(())
     }

@@ -3,10 +3,7 @@
 //! `journal/gnss.csv` here. New loops and fixes update the standing estimate; when both logs have
 //! ended, the poses are solved again, so that the last correction equals the results.
 
-use std::{
-    mem,
-    path::{Path, PathBuf},
-};
+use std::{mem, path::Path};
 
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
@@ -48,7 +45,6 @@ fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
 }
 
 struct Trajectory {
-    out: PathBuf,
     kind: EstimatorKind,
     /// The fixes that are later than all keyframes.
     fixes: Fixes,
@@ -69,7 +65,6 @@ struct Trajectory {
 impl Trajectory {
     fn open(out: &Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
         Ok(Self {
-            out: out.to_owned(),
             kind,
             keyframes: RecordReader::open(out)?,
             queries: RecordReader::open(out)?,
@@ -92,10 +87,9 @@ impl Trajectory {
         let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
         let mut read = self.read.iter().zip(unchanged);
         if read.any(|(read, unchanged)| unchanged < *read) {
-            *self = Self {
-                live_fixes: self.live_fixes.take(),
-                ..Self::open(&self.out.clone(), self.kind, self.fixes.clone())?
-            };
+            self.estimator = TrajectoryEstimator::new(self.kind).with_fixes(self.fixes.clone());
+            (self.newest, self.corrected, self.read) = (None, None, [0, 0]);
+            (self.is_final, self.has_changed) = (false, false);
         }
         Ok(())
     }

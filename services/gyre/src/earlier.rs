@@ -11,7 +11,7 @@ use std::{
 use gyre_configuration::Configuration;
 use gyre_journal::{
     self as journal, Content, JournalError,
-    checkpoint::{self, Checkpoint, CheckpointError},
+    checkpoint::{self, Checkpoint},
     keyframes::complete_poses,
     objects::LoggedObjects,
     scans::{LoggedScan, complete_scans},
@@ -256,11 +256,11 @@ fn known_poses(
 ) -> Result<u64, Failure> {
     let slam = &configuration.slam;
     let complete = match slam.is_on() {
-        true => complete_poses(out.path(), content.poses)?,
+        true => complete_poses(out.path(), content.poses).map_err(damaged)?,
         false => content.poses,
     };
     let complete = match configuration.objects.is_on() {
-        true => complete_scans(out.path(), complete)?,
+        true => complete_scans(out.path(), complete).map_err(|error| damaged(error.into()))?,
         false => complete,
     };
     if !configuration.starts(StageId::Refinement) {
@@ -293,11 +293,7 @@ fn known_poses(
             ));
             Ok(0)
         }
-        None => Err(CheckpointError::Missing {
-            path,
-            item: content.poses,
-        }
-        .into()),
+        None => Err(JournalError::no_state(&path, content.poses).into()),
     }
 }
 
@@ -331,6 +327,16 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
         "gyre: {reason}: that run is kept as {old}, and a new one begins in {new} (run.earlier)"
     ));
     Ok(Out::lock(path)?)
+}
+
+fn damaged(error: JournalError) -> Failure {
+    match error {
+        JournalError::Log(LogError::Damaged { .. }) => format!(
+            "{error}: restore it from a backup, choose another --out, or begin anew with --fresh"
+        )
+        .into(),
+        _ => error.into(),
+    }
 }
 
 fn state(out: &Path) -> [PathBuf; 12] {

@@ -16,8 +16,8 @@ use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Sess
 use gyre_run::Ending;
 use gyre_samples::GnssKind;
 use gyre_stage::{
-    Manifest,
-    run::{RootError, RunRoot, sweep},
+    Manifest, StageError,
+    run::{RunRoot, sweep},
     sessions::{BEGUN, log_session},
     wake::{Signals, let_signals_end_the_process},
 };
@@ -167,7 +167,7 @@ fn play(
     let (mut notifier, mut signals) = (Notifier::of_environment(), None);
     let mut ask = |it: &Configuration| waiting::for_radar(it, &out, (&mut notifier, &mut signals));
     let ready = match make_ready(configuration, programs, &out, earlier, &mut ask) {
-        Err(error) if matches!(error.downcast_ref(), Some(RootError::Interrupted)) => {
+        Err(error) if matches!(error.downcast_ref(), Some(StageError::Stopped)) => {
             return Ok(ExitCode::from(INTERRUPTED));
         }
         ready => ready?,
@@ -181,7 +181,7 @@ fn play(
         out = earlier::close(out, reason)?;
     }
     let root = match RunRoot::acquire(out.path(), &signals) {
-        Err(RootError::Interrupted) => return Ok(ExitCode::from(INTERRUPTED)),
+        Err(StageError::Stopped) => return Ok(ExitCode::from(INTERRUPTED)),
         root => root?,
     };
     preflight::check_shared_memory(&checked.footprint)?;

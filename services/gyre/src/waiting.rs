@@ -9,11 +9,7 @@ use std::{
 
 use gyre_configuration::Configuration;
 use gyre_results::Out;
-use gyre_stage::{
-    control::Status,
-    run::{RootError, RunRoot},
-    wake::Signals,
-};
+use gyre_stage::{StageError, control::Status, run::RunRoot, wake::Signals};
 use gyre_stages::live_radar::{AskError, Sizes};
 use gyre_supervise::wait;
 use gyre_terminal::{Failure, print};
@@ -25,12 +21,8 @@ const PAUSE: Duration = Duration::from_secs(1);
 const REPORT_EVERY: Duration = Duration::from_secs(60);
 
 fn may_come(error: &Failure) -> bool {
-    #[cfg(feature = "ros2")]
-    if crate::ros2::may_come(error) {
-        return true;
-    }
     let radar = error.downcast_ref::<AskError>();
-    radar.is_some_and(AskError::may_pass)
+    radar.is_some_and(|it| it.may_pass)
 }
 
 fn notice(error: &Failure) -> String {
@@ -88,5 +80,5 @@ pub fn for_radar(
         notifier.keep_alive();
         None
     });
-    answer?.ok_or(RootError::Interrupted)?
+    answer?.ok_or(StageError::Stopped)?
 }

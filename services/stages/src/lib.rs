@@ -1,6 +1,7 @@
 //! The stages of the pipeline, a module for each.
 
 use gyre_geometry::SparsePoint;
+use gyre_journal::JournalError;
 use gyre_messages::Masked;
 use gyre_stage::{StageError, reader::Received};
 
@@ -10,6 +11,14 @@ pub mod pose_integration;
 pub mod radar_replay;
 pub mod refinement;
 pub mod search;
+
+/// The error for a file of the run: a process that was killed, and is not gone yet, may have it.
+fn unusable(error: JournalError) -> StageError {
+    match error.is_busy() {
+        true => StageError::Transient(format!("cannot open a file of the run: {error}")),
+        false => StageError::input(error),
+    }
+}
 
 fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
     let points = scan.header().points(scan.values());

@@ -10,17 +10,15 @@ mod scans;
 
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_messages::{Item, Masked, MaskedHeader, Scan, StageId, flag, mask_kind};
+use gyre_messages::{Item, Masked, MaskedHeader, StageId, flag, mask_kind};
 use gyre_radar::{
     DopplerEstimator, LostAzimuthFinder, LostAzimuths, PlacedRows, PointsConfig, RasterConfig,
     lost::stale_rows,
 };
 use gyre_samples::DopplerConfig;
-use gyre_stage::{
-    Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
-};
+use gyre_stage::{Launch, Stage, StageCounters, StageError, stage, writer::Draft};
 
-use scans::{ScanView, Scans};
+use scans::{MovedScan, ScanView, Scans};
 
 pub use python::python;
 
@@ -91,35 +89,26 @@ impl Stage for Masking {
         input: ScanView<'_>,
         output: &mut Draft<Masked>,
     ) -> Result<(), StageError> {
+        let scan = input.current.scan;
         let failed = |error: MaskError| match error {
             MaskError::Function(reason) => StageError::Transient(reason),
-            error => input.scan.malformed(error.to_string()),
+            error => scan.malformed(error.to_string()),
         };
         let [rows, previous_rows] = &mut self.rows;
-        let mut place = |received, twist, known, rows| -> Result<_, StageError> {
-            let mut sweep = sweep(received, twist)?;
-            let starts = received.item().is(flag::BREAK);
-            let lost = self.azimuths.lost(&sweep, known, starts);
-            sweep.scan = PlacedRows::place(rows, &sweep.scan, &lost);
-            Ok(sweep)
-        };
+        let azimuths = &mut self.azimuths;
         let previous = match &input.previous {
-            Some(it) => Some(place(it.scan, it.twist, it.lost, previous_rows)?),
+            Some(previous) => Some(sweep(previous, azimuths, previous_rows)?),
             None => None,
         };
-        let sweep = place(input.scan, input.twist, input.lost, rows)?;
+        let sweep = sweep(&input.current, azimuths, rows)?;
         if let Some(previous) = &previous
             && !self.masker.can_follow(previous.number)
         {
             self.masker.set_previous(previous).map_err(failed)?;
         }
         let (header, values) = output.parts::<f32>();
-        let parts =
-            MaskedHeader::split(values, self.raster.n, self.masker.scans()).ok_or_else(|| {
-                input
-                    .scan
-                    .malformed("its rasters do not fit into a message")
-            })?;
+        let parts = MaskedHeader::split(values, self.raster.n, self.masker.scans())
+            .ok_or_else(|| scan.malformed("its rasters do not fit into a message"))?;
         let follows = previous.map(|previous| previous.number);
         let twist = self
             .masker
@@ -128,18 +117,18 @@ impl Stage for Masking {
         let points = self
             .masker
             .points(&sweep.scan, twist, parts.points)
-            .map_err(|error| input.scan.malformed(error.to_string()))?;
+            .map_err(|error| scan.malformed(error.to_string()))?;
         // Of the scan alone, so that a restart changes nothing.
         let velocity = self.doppler.as_mut().map(|doppler| {
             let velocity = doppler.estimate(&sweep.scan, self.min_range_m);
             velocity.ok()
         });
         *header = self.header(twist, points);
-        let azimuths = input.scan.header().azimuths as usize;
+        let azimuths = scan.header().azimuths as usize;
         header.azimuth_variance_rad2 = self.azimuths.last().variance_of_mean_rad2(azimuths);
-        header.set_turn(input.turn);
-        header.set_distance(input.distance);
-        header.set_velocity(velocity.flatten());
+        (header.gyro, header.has_gyro) = or_none(input.turn);
+        (header.wheels, header.has_wheels) = or_none(input.distance);
+        (header.doppler, header.has_doppler) = or_none(velocity.flatten());
         Ok(())
     }
 
@@ -169,15 +158,30 @@ impl Masking {
     }
 }
 
-fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, StageError> {
+/// Returns a measurement as a message has it: zeros without one, and whether there is one.
+fn or_none<T: Copy + Default>(measured: Option<T>) -> (T, u64) {
+    (measured.unwrap_or_default(), measured.is_some().into())
+}
+
+/// Returns a scan whose rows are at their places.
+fn sweep<'a>(
+    input: &MovedScan<'a>,
+    azimuths: &mut Azimuths,
+    rows: &'a mut PlacedRows,
+) -> Result<Sweep<'a>, StageError> {
+    let received = input.scan;
     let scan = received.header().view(received.values());
     let scan =
         scan.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
-    Ok(Sweep {
+    let mut sweep = Sweep {
         number: received.item().scan,
         scan,
-        twist,
-    })
+        twist: input.twist,
+    };
+    let starts = received.item().is(flag::BREAK);
+    let lost = azimuths.lost(&sweep, input.lost, starts);
+    sweep.scan = PlacedRows::place(rows, &sweep.scan, &lost);
+    Ok(sweep)
 }
 
 /// The lost azimuths of each scan, found from the scan before. A restarted masking continues from

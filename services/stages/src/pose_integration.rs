@@ -2,25 +2,19 @@
 //! pose before it is published. With SLAM it logs keyframes, with objects each scan. In live mode
 //! poses continue when the disk is full, and are not kept from then on.
 
-use std::fmt::Display;
-
-use gyre_journal::{
-    self as journal, Journal, JournalError,
-    keyframes::{Keyframes, KeyframesError},
-    scans::{Scans, ScansError},
-};
+use gyre_journal::{self as journal, Journal, PoseLog, keyframes::Keyframes, scans::Scans};
 use gyre_messages::{Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag};
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{
     Launch, Manifest, Sink, StageCounters, StageError, clock,
-    follower::{Growth, LogId},
+    follower::{LogId, Notifier},
     reader::Received,
     sink,
 };
-use gyre_storage::{LogError, continue_when_full, was_full};
+use gyre_storage::{continue_when_full, was_full};
 
-use crate::points;
+use crate::{points, unusable};
 
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     launch.take_place()?;
@@ -30,17 +24,24 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     }
     let slam: SlamConfig = launch.section("slam")?;
     let objects: ObjectsConfig = launch.section("objects")?;
-    let growth = |is_on: bool, log| is_on.then(|| Growth::of(launch, log)).transpose();
+    let journal = Journal::open(&journal::path(out)).map_err(unusable)?;
+    let (newest, ended) = journal.last(1).map_err(unusable)?;
+    let last = newest.last().copied();
+    let known = last.map_or(0, |last| last.item.seq.saturating_add(1));
+    let points = launch.manifest.limits.points;
+    let mut logs: Vec<(Box<dyn PoseLog>, Notifier)> = Vec::new();
+    if slam.is_on() {
+        let keyframes = Keyframes::open(out, known, ended, points).map_err(unusable)?;
+        logs.push((Box::new(keyframes), LogId::Keyframes.growth(launch)?));
+    }
+    if objects.is_on() {
+        let scans = Scans::open(out, known, ended, points).map_err(unusable)?;
+        logs.push((Box::new(scans), LogId::Scans.growth(launch)?));
+    }
     let mut integration = Integration {
-        journal: Journal::open(&journal::path(out)).map_err(unusable)?,
-        last: None,
-        keyframes_grown: growth(slam.is_on(), LogId::Keyframes)?,
-        scans_grown: growth(objects.is_on(), LogId::Scans)?,
-        slam,
-        objects,
-        points: launch.manifest.limits.points,
-        keyframes: None,
-        scans: None,
+        journal,
+        last,
+        logs,
         // A stage that died on the full disk has left it.
         loss: sink::notice(&launch.manifest),
         manifest: launch.manifest.clone(),
@@ -54,15 +55,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 struct Integration {
     journal: Journal,
     last: Option<PoseHeader>,
-    slam: SlamConfig,
-    objects: ObjectsConfig,
-    points: usize,
-    /// Of a run with SLAM, from [`Sink::restore`] on.
-    keyframes: Option<Keyframes>,
-    scans: Option<Scans>,
-    /// Wake the followers of the logs that the run has.
-    keyframes_grown: Option<Growth>,
-    scans_grown: Option<Growth>,
+    /// The logs that the run has, and what wakes the followers of each.
+    logs: Vec<(Box<dyn PoseLog>, Notifier)>,
     manifest: Manifest,
     /// The sentence about the poses that are not kept.
     loss: Option<String>,
@@ -72,25 +66,11 @@ impl Sink for Integration {
     const HOP: StageId = StageId::PoseIntegration;
 
     fn takes_scans(&self) -> bool {
-        self.slam.is_on() || self.objects.is_on()
+        !self.logs.is_empty()
     }
 
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
-        // At least one pose, to continue from.
-        let (mut poses, ended) = self.journal.last(count.max(1)).map_err(unusable)?;
-        self.last = poses.last().copied();
-        poses.drain(..poses.len().saturating_sub(count));
-        let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
-        if self.slam.is_on() {
-            let keyframes = Keyframes::open(&self.manifest.out, known, ended);
-            let keyframes = keyframes.map_err(unusable_keyframes)?;
-            self.keyframes.insert(keyframes).reserve(self.points);
-        }
-        if self.objects.is_on() {
-            let scans = Scans::open(&self.manifest.out, known, ended).map_err(unusable_scans)?;
-            self.scans.insert(scans).reserve(self.points);
-        }
-        Ok((poses, ended))
+        self.journal.last(count).map_err(unusable)
     }
 
     fn integrate(
@@ -100,15 +80,13 @@ impl Sink for Integration {
     ) -> Result<PoseHeader, StageError> {
         let mut pose = compose(self.last.as_ref(), motion);
         pose.item.hop_mut(Self::HOP).finished_ns = clock::now_ns();
-        if let (Some(keyframes), Some(scan)) = (&mut self.keyframes, scan) {
-            let added = keyframes.add(&pose, points(scan)?);
-            if added.map_err(unusable_keyframes)? {
-                self.keyframes_grown.iter().try_for_each(Growth::notify)?;
+        if let Some(scan) = scan {
+            let points = points(scan)?;
+            for (log, growth) in &mut self.logs {
+                if log.add(&pose, points).map_err(unusable)? {
+                    growth.notify()?;
+                }
             }
-        }
-        if let (Some(scans), Some(scan)) = (&mut self.scans, scan) {
-            scans.add(&pose, points(scan)?).map_err(unusable_scans)?;
-            self.scans_grown.iter().try_for_each(Growth::notify)?;
         }
         self.journal.append(&pose).map_err(unusable)?;
         if was_full() && self.loss.is_none() {
@@ -124,13 +102,9 @@ impl Sink for Integration {
     }
 
     fn end(&mut self, item: &Item) -> Result<(), StageError> {
-        if let Some(keyframes) = &mut self.keyframes {
-            keyframes.end().map_err(unusable_keyframes)?;
-            self.keyframes_grown.iter().try_for_each(Growth::notify)?;
-        }
-        if let Some(scans) = &mut self.scans {
-            scans.end().map_err(unusable_scans)?;
-            self.scans_grown.iter().try_for_each(Growth::notify)?;
+        for (log, growth) in &mut self.logs {
+            log.end().map_err(unusable)?;
+            growth.notify()?;
         }
         let end = PoseHeader {
             item: item.flagged(flag::END),
@@ -147,12 +121,8 @@ impl Integration {
     /// Waits until all that was written survives a power failure: a failure is found by nobody
     /// after this process.
     fn sync(&self) -> Result<(), StageError> {
-        if let Some(keyframes) = &self.keyframes {
-            keyframes.sync().map_err(unusable_keyframes)?;
-        }
-        if let Some(scans) = &self.scans {
-            scans.sync().map_err(unusable_scans)?;
-        }
+        let mut logs = self.logs.iter();
+        logs.try_for_each(|(log, _)| log.sync()).map_err(unusable)?;
         self.journal.sync().map_err(unusable)
     }
 
@@ -162,27 +132,5 @@ impl Integration {
         };
         let seq = last.item.seq;
         Err(StageError::Input(format!("{loss}; the last pose is {seq}")))
-    }
-}
-
-fn unusable(error: JournalError) -> StageError {
-    failed(matches!(error, JournalError::Busy(_)), "journal", &error)
-}
-
-fn unusable_keyframes(error: KeyframesError) -> StageError {
-    let is_busy = matches!(error, KeyframesError::Log(LogError::Busy(_)));
-    failed(is_busy, "keyframes", &error)
-}
-
-fn unusable_scans(error: ScansError) -> StageError {
-    let is_busy = matches!(error, ScansError::Log(LogError::Busy(_)));
-    failed(is_busy, "scans", &error)
-}
-
-/// The error for a file: a process that was killed, and is not gone yet, may have it.
-fn failed(is_busy: bool, file: &str, error: &dyn Display) -> StageError {
-    match is_busy {
-        true => StageError::Transient(format!("cannot open the {file}: {error}")),
-        false => StageError::Input(error.to_string()),
     }
 }

@@ -7,7 +7,7 @@ mod faults;
 mod listing;
 mod player;
 
-use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path, time::Duration};
+use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path};
 
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_messages::{ScanHeader, StageId};
@@ -15,7 +15,7 @@ use gyre_run::{PlayedFrom, SourceConfig};
 use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_stage::{
     Launch, Source, StageCounters, StageError,
-    source::{self, Tolerance, Unreadable},
+    source::{self, Unreadable},
 };
 
 use faults::Faults;
@@ -45,19 +45,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     // options too: a dataset.toml that is changed during a run does not change the run.
     let root = &launch.manifest.root;
     let open = || open(root, &config, &options).map_err(|error| error.to_string());
-    let mut dataset = source::open(launch, &tolerance(&config), open)?;
+    let mut dataset = source::open(launch, &config, open)?;
     let (gyro, wheels): (GyroConfig, WheelsConfig) =
         (launch.section("gyro")?, launch.section("wheels")?);
     let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
     let samples = samples.map_err(StageError::input)?;
     play(launch, dataset, samples, Pace::Sensor)
-}
-
-pub fn tolerance(config: &SourceConfig) -> Tolerance {
-    Tolerance {
-        retry: Duration::try_from_secs_f64(config.retry_s).unwrap_or(Duration::MAX),
-        max_unreadable: config.max_unreadable,
-    }
 }
 
 fn open(
@@ -99,7 +92,7 @@ pub fn play(
         faults,
         pace,
     };
-    let counters = source::run(launch, &mut replay, &tolerance(&config))?;
+    let counters = source::run(launch, &mut replay, &config)?;
     let slipped_s = counters.slipped_ns as f64 * 1e-9;
     if slipped_s > NOTABLE_SLIP_S {
         tracing::warn!(slipped_s, "the simulation did not keep up with the rate");

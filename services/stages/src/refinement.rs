@@ -1,7 +1,7 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
 use gyre_journal::{
-    checkpoint::{self, Checkpoint, CheckpointError},
+    checkpoint::{self, Checkpoint},
     continue_when_full,
 };
 use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
@@ -15,7 +15,7 @@ use gyre_stage::{
     writer::Draft,
 };
 
-use crate::points;
+use crate::{points, unusable};
 
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
@@ -112,15 +112,5 @@ impl RefinementStage {
             self.refiner.reset();
         }
         Ok(())
-    }
-}
-
-fn unusable(error: CheckpointError) -> StageError {
-    match error {
-        // A process that was killed, and is not gone yet.
-        CheckpointError::Busy(_) => {
-            StageError::Transient(format!("cannot open the checkpoint: {error}"))
-        }
-        _ => StageError::Input(error.to_string()),
     }
 }

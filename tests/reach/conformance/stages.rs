@@ -118,11 +118,7 @@ impl Broken<'_> {
         if let Some(expected) = self.next.filter(|next| item.seq > *next)
             && !self.does("swallows")
         {
-            return Err(StageError::SequenceGap {
-                topic: "of the test",
-                expected,
-                got: item.seq,
-            });
+            return Err(StageError::gap("of the test", expected, item.seq));
         }
         if !self.has_motion(item.seq) {
             self.waiting = Some(message);

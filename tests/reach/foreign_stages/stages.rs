@@ -180,8 +180,7 @@ fn mask(fault: &Fault, input: &PairView<'_, Scan>, output: &mut Draft<Masked>) -
 fn replay(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let dataset = gyre_datasets::open(&config.data, &DatasetOptions::default()).unwrap();
-    let tolerance = gyre_stages::radar_replay::tolerance(&config);
-    source::run(launch, &mut ForeignSource { fault, dataset }, &tolerance)
+    source::run(launch, &mut ForeignSource { fault, dataset }, &config)
 }
 
 struct ForeignSource {

@@ -10,7 +10,7 @@ use gyre_configuration::Configuration;
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
-    self as journal, Journal,
+    self as journal, Journal, PoseLog,
     checkpoint::{self, Checkpoint},
     keyframes::Keyframes,
 };
@@ -162,7 +162,9 @@ impl Stages {
         let last = poses.pop();
         let slam = &configuration.slam;
         let poses = last.map_or(0, |last| last.item.seq + 1);
-        let keyframes = slam.is_on().then(|| Keyframes::open(out, poses, ended));
+        let keyframes = slam
+            .is_on()
+            .then(|| Keyframes::open(out, poses, ended, POINTS));
         Ok(Self {
             refiner,
             checkpoint,

@@ -14,7 +14,6 @@ pub(crate) fn other_version(other: &str) -> StageError {
 pub(crate) fn failed(action: &str, error: &dyn Display) -> StageError {
     // zenoh appends the place in its sources.
     let text = error.to_string();
-    let reason = text.split(" at /").next().unwrap_or_default().to_owned();
-    let action = action.to_owned();
-    StageError::Transport { action, reason }
+    let reason = text.split(" at /").next().unwrap_or_default();
+    StageError::Transient(format!("cannot {action}: {reason}"))
 }

@@ -241,12 +241,7 @@ impl Robot<'_> {
             return Ok(None);
         }
         if got > expected {
-            let topic = Pose::TOPIC;
-            return Err(StageError::SequenceGap {
-                topic,
-                expected,
-                got,
-            });
+            return Err(StageError::gap(Pose::TOPIC, expected, got));
         }
         pose.item = self.timed(pose.item);
         self.journal.append(&pose).map_err(StageError::input)?;

@@ -20,38 +20,31 @@ const POLL: Duration = Duration::from_millis(10);
 #[error("{sentence}")]
 pub struct AskError {
     sentence: String,
-    may_pass: bool,
+    /// True if the radar may answer later: it or its network is not there yet.
+    pub may_pass: bool,
 }
 
 impl AskError {
     pub fn passing(sentence: String) -> Self {
-        Self {
-            sentence,
-            may_pass: true,
-        }
+        Self::of(sentence, true)
     }
 
     pub fn lasting(sentence: String) -> Self {
-        Self {
-            sentence,
-            may_pass: false,
-        }
+        Self::of(sentence, false)
+    }
+
+    fn of(sentence: String, may_pass: bool) -> Self {
+        Self { sentence, may_pass }
     }
 
     fn no_answer(address: &str, error: &io::Error) -> Self {
         let text = error.to_string();
         let is_unknown_name = text.contains("lookup address") && !text.contains("emporary");
-        Self {
-            sentence: format!(
-                "no radar answers at {address} ({text}): check source.address, and that the radar is on and in reach"
-            ),
-            may_pass: !is_unknown_name && error.kind() != ErrorKind::InvalidInput,
-        }
-    }
-
-    /// Returns whether the radar may answer later: it or its network is not there yet.
-    pub fn may_pass(&self) -> bool {
-        self.may_pass
+        let sentence = format!(
+            "no radar answers at {address} ({text}): check source.address, and that the radar is on and in reach"
+        );
+        let may_pass = !is_unknown_name && error.kind() != ErrorKind::InvalidInput;
+        Self::of(sentence, may_pass)
     }
 }
 
@@ -111,17 +104,17 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
         }
     }
     let limit_s = MAX_WAIT.as_secs();
-    Err(match (&settings.address, damage.filter(|_| !understood)) {
-        (_, Some(damage)) => {
-            AskError::lasting(format!("what arrives at {address} are no scans: {damage}"))
-        }
-        (Address::Tcp(_), None) => AskError::passing(format!(
+    let has_damage = damage.is_some() && !understood;
+    let sentence = match (&settings.address, damage.filter(|_| !understood)) {
+        (_, Some(damage)) => format!("what arrives at {address} are no scans: {damage}"),
+        (Address::Tcp(_), None) => format!(
             "{address} sent no configuration of a radar within {limit_s} s: is it a Navtech radar, and has it less than three clients?"
-        )),
-        (Address::Udp { .. }, None) => AskError::passing(format!(
+        ),
+        (Address::Udp { .. }, None) => format!(
             "nothing arrives at {address} within {limit_s} s: check that the radar's data output is CAT-240 to this address, and that source.interface is this machine's address on the radar's network"
-        )),
-    })
+        ),
+    };
+    Err(AskError::of(sentence, !has_damage))
 }
 
 #[cfg(test)]
@@ -138,7 +131,7 @@ mod tests {
             (ErrorKind::InvalidInput.into(), false),
         ] {
             let error = AskError::no_answer("radar:6317", &error);
-            assert_eq!(error.may_pass(), may_pass, "{error}");
+            assert_eq!(error.may_pass, may_pass, "{error}");
         }
     }
 }

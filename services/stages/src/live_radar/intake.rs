@@ -48,7 +48,7 @@ impl Intake {
             return Ok(false);
         }
         let new = ScanAssembly::new(radar, self.constants)?;
-        let bytes = new.bytes();
+        let bytes = new.assembler.limits().bytes;
         if bytes > room {
             return Err(NoScans::TooLarge { bytes, room });
         }
@@ -113,7 +113,9 @@ impl Intake {
     }
 
     pub fn received(&self) -> Received {
-        let is_open = self.scans.as_ref().is_some_and(ScanAssembly::is_open);
+        // Whether the turn of the newest azimuth can still become a scan.
+        let scans = self.scans.as_ref();
+        let is_open = scans.is_some_and(|scans| scans.assembler.is_open());
         Received {
             scans_left_out: self.turns.left_out(is_open),
             last_scan: self.turns.last(),

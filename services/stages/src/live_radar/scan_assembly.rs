@@ -19,7 +19,7 @@ const BATCH_SHARE: f64 = 0.5;
 pub struct ScanAssembly {
     radar: Configuration,
     clock: RadarClock,
-    assembler: SweepAssembler,
+    pub assembler: SweepAssembler,
     delay: ReadDelay,
     is_clock_logged: bool,
     is_delay_logged: bool,
@@ -35,15 +35,6 @@ impl ScanAssembly {
             is_clock_logged: false,
             is_delay_logged: false,
         })
-    }
-
-    pub fn bytes(&self) -> usize {
-        self.assembler.limits().bytes
-    }
-
-    /// Returns whether the turn of the newest azimuth can still become a scan.
-    pub fn is_open(&self) -> bool {
-        self.assembler.is_open()
     }
 
     /// Adds an azimuth with its time of arrival, ns since 1970. Returns, for a completed scan, its
@@ -204,7 +195,10 @@ mod tests {
         let mut source = Source::new();
         let mut turn = |start_ns, step_ns| {
             let missing = source.turn(start_ns, step_ns);
-            (missing, source.turns.left_out(source.scans.is_open()))
+            (
+                missing,
+                source.turns.left_out(source.scans.assembler.is_open()),
+            )
         };
         assert_eq!(turn(START_NS, 0), (Some(0), 0));
         assert_eq!(turn(START_NS + 250_000_000, -20_000_000), (None, 1));

@@ -14,7 +14,7 @@ const WEIGHT: f64 = 1.0 / 16.0;
 /// Counts the turns between scans by time, also across connections and restarts.
 ///
 /// The turn of the first azimuth is not counted if it had begun before that azimuth.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TurnCounter {
     /// Duration of a turn: as configured, then as measured. 0: not known.
     turn_ns: f64,
@@ -28,11 +28,9 @@ pub struct TurnCounter {
 impl TurnCounter {
     pub fn resume(last: Option<LastScan>, left_out: u64) -> Self {
         Self {
-            turn_ns: 0.0,
-            configured_ns: 0,
             last,
-            newest: None,
             left_out,
+            ..Self::default()
         }
     }
 

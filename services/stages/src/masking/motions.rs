@@ -5,32 +5,27 @@
 use std::collections::BTreeMap;
 
 use gyre_geometry::Twist;
-use gyre_messages::{Item, Motion, MotionEstimate, Pose, flag};
+use gyre_messages::{Item, Motion, MotionEstimate, flag};
 use gyre_radar::LostAzimuths;
-use gyre_stage::{Launch, Listener, StageError, reader::Port};
+use gyre_stage::{Launch, Listener, StageError, reader::Port, source::Credit};
 
 /// Number of motions kept: more than any window and lag need.
 const KEPT: usize = 256;
 
 pub struct Motions {
     motions: Port<Motion>,
-    poses: Port<Pose>,
+    pub credit: Credit,
     pub known: KnownMotions,
     lost: BTreeMap<u64, LostAzimuths>,
-    /// The item of the newest pose as the sink reported it.
-    pub resume_at: Option<Item>,
-    pub newest_pose: Option<u64>,
 }
 
 impl Motions {
     pub fn open(launch: &Launch) -> Result<Self, StageError> {
         Ok(Self {
             motions: Port::open(launch)?,
-            poses: Port::open(launch)?,
+            credit: Credit::open(launch)?,
             known: KnownMotions::default(),
             lost: BTreeMap::new(),
-            resume_at: None,
-            newest_pose: None,
         })
     }
 
@@ -39,19 +34,12 @@ impl Motions {
             self.known
                 .receive(received.item(), &received.header().motion);
         }
-        while let Some(received) = self.poses.receive()? {
-            let item = *received.item();
-            if item.is(flag::END) {
-                continue;
-            }
-            if !item.is(flag::BASE) {
-                self.known.receive(&item, &received.header().motion);
-                self.newest_pose = self.newest_pose.max(Some(item.seq));
+        while let Some(received) = self.credit.take()? {
+            let item = received.item();
+            if !item.is(flag::BASE) && !item.is(flag::END) {
+                self.known.receive(item, &received.header().motion);
                 self.lost.insert(item.seq, item.lost_azimuths());
                 drop_the_oldest(&mut self.lost);
-            }
-            if item.is(flag::SYNC) {
-                self.resume_at = Some(item);
             }
         }
         Ok(())
@@ -62,7 +50,7 @@ impl Motions {
     }
 
     pub fn listeners(&self) -> [&Listener; 2] {
-        [self.motions.listener(), self.poses.listener()]
+        [self.motions.listener(), self.credit.poses.listener()]
     }
 }
 

@@ -4,7 +4,7 @@ use std::{error::Error, path::Path};
 
 use gyre_masking::{Factors, MaskFunction};
 use gyre_radar::{PolarScan, RasterConfig, Sense};
-use gyre_stage::python_function::{Argument, Array, Function, Name, Returned, Scan};
+use gyre_stage::python_function::{Argument, Array, Function, Returned, Scan};
 use gyre_stage::{Launch, StageError};
 use ndarray::{ArrayView1, ArrayView2};
 use serde_json::{Map, json};
@@ -12,7 +12,7 @@ use serde_json::{Map, json};
 /// Loads the function `mask` of a file of Python, for [`run_with`](crate::masking::run_with).
 pub fn python(launch: &Launch, file: &Path) -> Result<Box<dyn MaskFunction>, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
-    let function = Function::load(file, Name::Mask)?;
+    let function = Function::load(file, "mask")?;
     let cell_m = raster.cell_m;
     Ok(Box::new(PythonMask { function, cell_m }))
 }

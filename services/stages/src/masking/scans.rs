@@ -29,20 +29,18 @@ pub struct Scans {
 }
 
 pub struct ScanView<'a> {
+    pub current: MovedScan<'a>,
+    pub previous: Option<MovedScan<'a>>,
+    pub turn: Option<GyroTurn>,
+    pub distance: Option<WheelDistance>,
+}
+
+pub struct MovedScan<'a> {
     pub scan: &'a Received<Scan>,
     /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
     /// with the yaw rate of the gyro; `None` without such a motion.
     pub twist: Option<Twist>,
-    pub turn: Option<GyroTurn>,
-    pub distance: Option<WheelDistance>,
     /// Where its azimuths were lost, if it has a pose from before a restart.
-    pub lost: Option<LostAzimuths>,
-    pub previous: Option<PreviousScan<'a>>,
-}
-
-pub struct PreviousScan<'a> {
-    pub scan: &'a Received<Scan>,
-    pub twist: Option<Twist>,
     pub lost: Option<LostAzimuths>,
 }
 
@@ -72,10 +70,10 @@ impl Inputs for Scans {
         self.motions.update()?;
         // The newest pose decides which scans are still needed, and in live mode where the chain
         // resumes.
-        let Some(resume_at) = self.motions.resume_at else {
+        let Some(resume_at) = self.motions.credit.resume_at else {
             return Ok(Action::Wait);
         };
-        let newest_pose = self.motions.newest_pose;
+        let newest_pose = self.motions.credit.newest;
         let action = self.queue.next_action(&resume_at, newest_pose)?;
         match action {
             Action::Process(item, _) if !self.find_motions(&item) => return Ok(Action::Wait),
@@ -90,18 +88,19 @@ impl Inputs for Scans {
         let [motion, previous_motion] = self.found;
         let [previous_rate, rate] = self.gyro.sweep_rates_radps();
         let [lost, previous_lost] = self.lost;
-        let previous = self.queue.previous().map(|scan| PreviousScan {
-            scan,
-            twist: with_yaw_rate(previous_motion, previous_rate),
-            lost: previous_lost,
-        });
         Some(ScanView {
-            scan: self.queue.current()?,
-            twist: with_yaw_rate(motion, rate),
+            current: MovedScan {
+                scan: self.queue.current()?,
+                twist: with_yaw_rate(motion, rate),
+                lost,
+            },
+            previous: self.queue.previous().map(|scan| MovedScan {
+                scan,
+                twist: with_yaw_rate(previous_motion, previous_rate),
+                lost: previous_lost,
+            }),
             turn: self.gyro.turn(),
             distance: self.wheels.distance(),
-            lost,
-            previous,
         })
     }
 
@@ -112,7 +111,7 @@ impl Inputs for Scans {
     fn listeners(&self) -> Vec<&Listener> {
         let scans = self.queue.listener();
         // Motions and poses are read when a scan comes.
-        if self.queue.current().is_none() && self.motions.resume_at.is_some() {
+        if self.queue.current().is_none() && self.motions.credit.resume_at.is_some() {
             return vec![scans];
         }
         let [motions, poses] = self.motions.listeners();

@@ -6,7 +6,7 @@ use std::path::Path;
 use gyre_messages::{Header, Masked};
 use gyre_radar::RasterConfig;
 use gyre_scan_matching::{MotionMatch, RotationMatch};
-use gyre_stage::python_function::{Argument, Array, Function, Name, Returned, Scan};
+use gyre_stage::python_function::{Argument, Array, Function, Returned, Scan};
 use gyre_stage::{Launch, StageError, inputs::PairView};
 use nalgebra::matrix;
 use ndarray::ArrayView2;
@@ -17,7 +17,7 @@ use crate::search::{rotation, translation};
 /// Loads the function `rotation` of a file: the yaw of the later scan in the frame of the earlier
 /// one, rad, and its standard deviation.
 pub fn rotation(launch: &Launch, file: &Path) -> Result<rotation::Search, StageError> {
-    let (mut function, cell_m) = load(launch, file, Name::Rotation)?;
+    let (mut function, cell_m) = load(launch, file, "rotation")?;
     Ok(Box::new(move |pair| {
         let Some(scans) = scans(pair, cell_m)? else {
             return Ok(None);
@@ -35,7 +35,7 @@ pub fn rotation(launch: &Launch, file: &Path) -> Result<rotation::Search, StageE
 /// Loads the function `translation` of a file: the place of the later scan in the frame of the
 /// earlier one, m, and its standard deviation or covariance.
 pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, StageError> {
-    let (mut function, cell_m) = load(launch, file, Name::Translation)?;
+    let (mut function, cell_m) = load(launch, file, "translation")?;
     Ok(Box::new(move |pair, rotation| {
         let Some([scan, previous]) = scans(pair, cell_m)? else {
             return Ok(None);
@@ -58,7 +58,7 @@ pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, 
     }))
 }
 
-fn load(launch: &Launch, file: &Path, name: Name) -> Result<(Function, f32), StageError> {
+fn load(launch: &Launch, file: &Path, name: &str) -> Result<(Function, f32), StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     Ok((Function::load(file, name)?, raster.cell_m))
 }

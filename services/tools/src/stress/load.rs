@@ -13,7 +13,7 @@ use gyre_stage::{
     observer::{ObservedRun, wait_for_any},
     wake::{MAX_WAIT, Signals},
 };
-use gyre_supervise::memory::Room;
+use gyre_supervise::memory;
 use gyre_terminal::{Failure, print};
 
 /// The line that a helper prints when it works.
@@ -41,11 +41,10 @@ pub(super) fn spin() -> ! {
 pub(super) fn churn(share: f64) -> Result<(), Failure> {
     // If memory runs out all the same, this process is the one to end.
     let _ = fs::write("/proc/self/oom_score_adj", "1000");
-    let least = || Room::now().least();
-    let available = least().ok_or("the memory that is available is not known")?;
+    let available = memory::left().ok_or("the memory that is available is not known")?;
     let most = (available as f64 * share.clamp(0.0, 0.95)) as u64;
     let mut pieces: Vec<Vec<u8>> = Vec::new();
-    let has_room = || least().is_some_and(|left| left > LEFT + PIECE as u64);
+    let has_room = || memory::left().is_some_and(|left| left > LEFT + PIECE as u64);
     let began = Instant::now();
     while ((pieces.len() * PIECE) as u64) < most && has_room() && began.elapsed() < TAKING {
         pieces.push(piece());

@@ -17,9 +17,9 @@ use std::{
 
 use gyre_messages::{MotionEstimate, PoseHeader};
 use gyre_scan_matching::{Refiner, TrackerState};
-use gyre_storage::{Busy, DurableFile, GroupSync, Slots, StorageError};
-use thiserror::Error;
+use gyre_storage::{DurableFile, GroupSync, Slots, StorageError};
 
+use crate::JournalError;
 use codec::{
     EMPTY, KEYFRAME_WORDS, Name, decode_keyframe, decode_state, encode_keyframe, encode_state,
     keyframe_name, state_bytes,
@@ -40,19 +40,6 @@ const HEADER_BYTES: usize = 16 + 4 * 8;
 const fn look_back(window: usize) -> usize {
     const HEADROOM: usize = 8;
     2 * window + GroupSync::LIMIT as usize + HEADROOM
-}
-
-#[derive(Debug, Error)]
-pub enum CheckpointError {
-    #[error(transparent)]
-    Storage(#[from] StorageError),
-    /// The state is not in the file, which is of another version or configuration, or damaged.
-    #[error(
-        "{path} does not have the state of the refinement before item {item}: start again with --fresh"
-    )]
-    Missing { path: PathBuf, item: u64 },
-    #[error(transparent)]
-    Busy(#[from] Busy),
 }
 
 #[derive(Debug)]
@@ -129,7 +116,7 @@ impl Checkpoint {
         window: usize,
         max_keyframes: usize,
         cells: usize,
-    ) -> Result<Self, CheckpointError> {
+    ) -> Result<Self, JournalError> {
         let layout = Layout::of(max_keyframes, cells);
         let file = DurableFile::open(path, |file| {
             let (header, mut found) = (layout.header(), [0; HEADER_BYTES]);
@@ -138,7 +125,7 @@ impl Checkpoint {
                 file.set_length(0)?;
                 file.write_at(&header, 0)?;
             }
-            Ok::<(), CheckpointError>(())
+            Ok::<(), JournalError>(())
         })?;
         let mut checkpoint = Self {
             file,
@@ -166,12 +153,7 @@ impl Checkpoint {
     /// keyframes, then the state that names them. If the file has this state already, the process
     /// repeats items after a restart, and it is left: later states may still be needed. If it has
     /// another state, all later ones are obsolete.
-    pub fn write(
-        &mut self,
-        item: u64,
-        motion: u64,
-        refiner: &Refiner,
-    ) -> Result<(), CheckpointError> {
+    pub fn write(&mut self, item: u64, motion: u64, refiner: &Refiner) -> Result<(), JournalError> {
         self.name_keyframes(item, refiner);
         let (states, slot) = (self.layout.states, slot_of(item));
         encode_state((item, motion), &self.map, refiner.state(), &mut self.state);
@@ -254,11 +236,9 @@ impl Checkpoint {
         Ok(state.map(|((_, motion), tracker)| (motion, tracker)))
     }
 
-    pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
-        let missing = CheckpointError::Missing {
-            path: self.file.file.path().to_owned(),
-            item: item.saturating_add(1),
-        };
+    pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), JournalError> {
+        let path = self.file.file.path();
+        let missing = JournalError::no_state(path, item.saturating_add(1));
         let Some((_, tracker)) = self.read_state(item)? else {
             return Err(missing);
         };
@@ -289,7 +269,7 @@ impl Checkpoint {
     pub fn newest_known<'a>(
         &mut self,
         poses: impl IntoIterator<Item = &'a PoseHeader>,
-    ) -> Result<Option<&'a PoseHeader>, CheckpointError> {
+    ) -> Result<Option<&'a PoseHeader>, JournalError> {
         for pose in poses {
             let motion = checksum(&pose.motion);
             let state = self.read_state(pose.item.seq)?;

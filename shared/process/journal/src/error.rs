@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_storage::{Busy, StorageError};
+use gyre_storage::{Busy, LogError, StorageError};
 use thiserror::Error;
 
 #[derive(Debug, Error)]
@@ -19,11 +19,30 @@ pub enum JournalError {
     Damaged { path: PathBuf, pose: u64 },
     #[error(transparent)]
     Busy(#[from] Busy),
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A file lacks what the poses of the journal need.
+    #[error("{0}")]
+    Missing(String),
 }
 
 impl JournalError {
     pub(crate) fn damaged(path: &Path, pose: u64) -> Self {
         let path = path.to_owned();
         Self::Damaged { path, pose }
+    }
+
+    /// The state is not in the checkpoint, which is of another version or configuration, or
+    /// damaged.
+    pub fn no_state(checkpoint: &Path, item: u64) -> Self {
+        Self::Missing(format!(
+            "{} does not have the state of the refinement before item {item}: start again with --fresh",
+            checkpoint.display()
+        ))
+    }
+
+    /// Returns whether another process has the file: one that was killed may not be gone yet.
+    pub fn is_busy(&self) -> bool {
+        matches!(self, Self::Busy(_) | Self::Log(LogError::Busy(_)))
     }
 }

@@ -6,20 +6,8 @@ use gyre_geometry::SparsePoint;
 use gyre_messages::PoseHeader;
 use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose, records_path};
 use gyre_storage::LogError;
-use thiserror::Error;
 
-use crate::JournalError;
-
-#[derive(Debug, Error)]
-pub enum KeyframesError {
-    #[error(transparent)]
-    Log(#[from] LogError),
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    /// They are fewer than the poses of the journal need.
-    #[error("{0}")]
-    Missing(String),
-}
+use crate::{JournalError, PoseLog};
 
 #[derive(Debug)]
 pub struct Keyframes {
@@ -32,8 +20,10 @@ impl Keyframes {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Keyframes beyond them are cut off, and the motion since
     /// the last one is recovered from the journal.
-    pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, KeyframesError> {
+    /// Appending allocates nothing for scans of up to `points` points.
+    pub fn open(out: &Path, poses: u64, ended: bool, points: usize) -> Result<Self, JournalError> {
         let mut log = RecordLog::open(out)?;
+        log.reserve(Keyframe::encoded_len(points));
         let (keyframes, last) = newest(log.len(), poses, |index| log.read(index))?;
         // The end of the keyframes is before the end of the journal.
         if !ended {
@@ -43,31 +33,22 @@ impl Keyframes {
             (builder, None) => Ok(Self {
                 log,
                 builder,
-                points: Vec::new(),
+                points: Vec::with_capacity(points),
             }),
             (_, Some(pose)) => {
                 let path = records_path::<Keyframe>(out);
-                Err(KeyframesError::Missing(format!(
+                Err(JournalError::Missing(format!(
                     "{} lacks the keyframe of pose {pose}: the same command computes it again",
                     path.display()
                 )))
             }
         }
     }
+}
 
-    /// Allocates the memory for keyframes of up to `points` points: later appends allocate nothing.
-    pub fn reserve(&mut self, points: usize) {
-        self.points.reserve(points);
-        self.log.reserve(Keyframe::encoded_len(points));
-    }
-
-    /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended
-    /// with the scan's points. Returns whether it does.
-    pub fn add(
-        &mut self,
-        pose: &PoseHeader,
-        points: &[SparsePoint],
-    ) -> Result<bool, KeyframesError> {
+impl PoseLog for Keyframes {
+    /// Appends the pose if it becomes a keyframe.
+    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError> {
         let Some(mut keyframe) = self.builder.next(&scan_pose(pose)) else {
             self.log.rely()?;
             return Ok(false);
@@ -80,21 +61,18 @@ impl Keyframes {
         Ok(true)
     }
 
-    /// Marks the end of the stream, before the journal does. All keyframes survive a power failure
-    /// when this returns.
-    pub fn end(&mut self) -> Result<(), KeyframesError> {
+    fn end(&mut self) -> Result<(), JournalError> {
         Ok(self.log.end()?)
     }
 
-    /// Waits until all keyframes so far survive a power failure.
-    pub fn sync(&self) -> Result<(), KeyframesError> {
+    fn sync(&self) -> Result<(), JournalError> {
         Ok(self.log.sync()?)
     }
 }
 
 /// Returns how many of the first `poses` poses of the journal have all their keyframes. After a
 /// death all of them have; a power failure can take the last keyframes. Changes nothing.
-pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, KeyframesError> {
+pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, JournalError> {
     let mut reader = RecordReader::open(out)?;
     let (_, last) = newest(reader.len(), poses, |index| reader.read(index))?;
     let (_, missing) = recover(out, last.as_ref(), poses)?;
@@ -123,7 +101,7 @@ fn recover(
     out: &Path,
     newest: Option<&Keyframe>,
     poses: u64,
-) -> Result<(KeyframeBuilder, Option<u64>), KeyframesError> {
+) -> Result<(KeyframeBuilder, Option<u64>), JournalError> {
     let mut builder = KeyframeBuilder::default();
     let last = newest.map_or(0, |keyframe| keyframe.seq);
     let records = crate::records_from(&crate::path(out), last)?;

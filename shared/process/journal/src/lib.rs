@@ -20,6 +20,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+use gyre_geometry::SparsePoint;
 use gyre_messages::{PoseHeader, flag};
 use gyre_storage::DurableFile;
 
@@ -36,6 +37,19 @@ pub struct Journal {
     records: u64,
     found: u64,
     buffer: [u8; RECORD],
+}
+
+/// A log of poses with the points of their scans, each appended before its pose is journalled.
+pub trait PoseLog {
+    /// Takes the next pose, before it is journalled. Returns whether it was appended.
+    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError>;
+
+    /// Marks the end of the stream, before the journal does. All records survive a power failure
+    /// when this returns.
+    fn end(&mut self) -> Result<(), JournalError>;
+
+    /// Waits until all records so far survive a power failure.
+    fn sync(&self) -> Result<(), JournalError>;
 }
 
 pub fn path(out: &Path) -> PathBuf {
@@ -72,23 +86,14 @@ impl Journal {
     /// Returns the last poses, at most `count`, oldest first, and whether the end of the stream
     /// follows them.
     pub fn last(&self, count: usize) -> Result<(Vec<PoseHeader>, bool), JournalError> {
-        let mut poses = Vec::with_capacity(count);
-        let mut ended = false;
-        let mut bytes = [0; RECORD];
-        for index in (0..self.records).rev() {
-            if poses.len() == count {
-                break;
-            }
-            let whole = self.file.read(&RECORDS, index, &mut bytes)?;
-            let record = Record::decode(&bytes, index).filter(|_| whole);
-            let damaged = || JournalError::damaged(self.file.file.path(), index);
-            let pose = record.ok_or_else(damaged)?.pose;
-            match pose.item.is(flag::END) {
-                true => ended = true,
-                false => poses.push(pose),
-            }
-        }
-        poses.reverse();
+        // One record more, which may be the end.
+        let more = (count as u64).saturating_add(1);
+        let first = self.records.saturating_sub(more);
+        let records = records_from(self.file.file.path(), first)?;
+        let poses: Result<Vec<_>, _> = records.into_iter().flatten().collect();
+        let mut poses = poses?;
+        let ended = poses.pop_if(|last| last.item.is(flag::END)).is_some();
+        poses.drain(..poses.len().saturating_sub(count));
         Ok((poses, ended))
     }
 

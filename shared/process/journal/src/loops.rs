@@ -36,21 +36,31 @@ impl LoggedLoops {
         }
         while self.read < self.queries.len() {
             let query = self.queries.read(self.read)?;
-            for (candidate, _) in query.loops() {
-                let ends = [query.keyframe, candidate.place];
-                let [later, earlier] = ends.map(|index| self.keyframes.read_without_points(index));
-                let loops = self.loops.len() as u64;
-                self.loops
-                    .push(loop_header(loops, &later?, &earlier?, candidate));
-            }
+            let found = loops_of(&query, self.loops.len() as u64, &mut self.keyframes)?;
+            self.loops.extend(found);
             self.read += 1;
         }
         Ok(&self.loops)
     }
 }
 
+/// Returns the messages of the loops of a query, numbered from `first` on.
+pub fn loops_of(
+    query: &Query,
+    first: u64,
+    keyframes: &mut RecordReader<Keyframe>,
+) -> Result<Vec<LoopHeader>, LogError> {
+    let mut found = Vec::new();
+    for (number, (candidate, _)) in (first..).zip(query.loops()) {
+        let ends = [query.keyframe, candidate.place];
+        let [later, earlier] = ends.map(|index| keyframes.read_without_points(index));
+        found.push(loop_header(number, &later?, &earlier?, candidate));
+    }
+    Ok(found)
+}
+
 /// Returns the message of the loop with the number `loops`, which closes `candidate`.
-pub fn loop_header(
+fn loop_header(
     loops: u64,
     later: &Keyframe,
     earlier: &Keyframe,

@@ -9,8 +9,7 @@ use gyre_messages::PoseHeader;
 use gyre_slam::{Record, RecordLog, RecordReader, records_path};
 use gyre_storage::{LogError, LogMagic};
 
-pub use crate::keyframes::KeyframesError as ScansError;
-use crate::record::split;
+use crate::{JournalError, PoseLog, record::split};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedScan {
@@ -100,12 +99,14 @@ pub struct Scans {
 impl Scans {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Scans beyond them are cut off.
-    pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, ScansError> {
+    /// Appending allocates nothing for scans of up to `points` points.
+    pub fn open(out: &Path, poses: u64, ended: bool, points: usize) -> Result<Self, JournalError> {
         let mut log = RecordLog::open(out)?;
+        log.reserve(size_of::<Fixed>() + points * size_of::<SparsePoint>());
         let scans = log.len() as u64;
         if scans < poses {
             let path = records_path::<LoggedScan>(out);
-            return Err(ScansError::Missing(format!(
+            return Err(JournalError::Missing(format!(
                 "{} has {scans} scans of {poses} poses: the same command computes them again",
                 path.display()
             )));
@@ -116,36 +117,28 @@ impl Scans {
         }
         Ok(Self {
             log,
-            points: Vec::new(),
+            points: Vec::with_capacity(points),
         })
     }
+}
 
-    /// Allocates the memory for scans of up to `points` points: later appends allocate nothing.
-    pub fn reserve(&mut self, points: usize) {
-        self.points.reserve(points);
-        self.log
-            .reserve(size_of::<Fixed>() + points * size_of::<SparsePoint>());
-    }
-
-    /// Appends the scan of the next pose, before that is journalled.
-    pub fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<(), ScansError> {
+impl PoseLog for Scans {
+    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError> {
         let mut memory = std::mem::take(&mut self.points);
         memory.clear();
         memory.extend_from_slice(points);
         let scan = LoggedScan::of(pose, memory);
         let appended = self.log.append(&scan);
         self.points = scan.points;
-        Ok(appended?)
+        appended?;
+        Ok(true)
     }
 
-    /// Marks the end of the stream, before the journal does. All scans survive a power failure when
-    /// this returns.
-    pub fn end(&mut self) -> Result<(), ScansError> {
+    fn end(&mut self) -> Result<(), JournalError> {
         Ok(self.log.end()?)
     }
 
-    /// Waits until all scans so far survive a power failure.
-    pub fn sync(&self) -> Result<(), ScansError> {
+    fn sync(&self) -> Result<(), JournalError> {
         Ok(self.log.sync()?)
     }
 }
@@ -186,18 +179,18 @@ mod tests {
     fn scans_are_read_as_they_were_logged_and_those_beyond_the_journal_are_cut_off() {
         let out = tempfile::tempdir().unwrap();
         let points = [SparsePoint::from([10.0, 2.0, 0.1, 0.5, 0.04]); 3];
-        let mut scans = Scans::open(out.path(), 0, false).unwrap();
-        (0..4).for_each(|seq| scans.add(&header(seq), &points).unwrap());
+        let mut scans = Scans::open(out.path(), 0, false, 3).unwrap();
+        (0..4).for_each(|seq| assert!(scans.add(&header(seq), &points).unwrap()));
         drop(scans);
         let mut reader = RecordReader::<LoggedScan>::open(out.path()).unwrap();
         let read = reader.read(2).unwrap();
         assert_eq!((read.seq, read.scan, read.points.len()), (2, 9, 3));
         assert_eq!(read.points[0], points[0]);
         assert!((read.twist.vx_mps - 6.0).abs() < 1e-12 && read.pose.translation.x == 3.0);
-        drop(Scans::open(out.path(), 3, false).unwrap());
+        drop(Scans::open(out.path(), 3, false, 3).unwrap());
         assert_eq!(reader.refresh().unwrap(), 3);
         assert_eq!(complete_scans(out.path(), 9).unwrap(), 3);
-        let missing = Scans::open(out.path(), 5, false).map(drop).unwrap_err();
+        let missing = Scans::open(out.path(), 5, false, 3).map(drop).unwrap_err();
         assert!(
             missing.to_string().contains("has 3 scans of 5 poses"),
             "{missing}"

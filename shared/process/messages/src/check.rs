@@ -1,13 +1,9 @@
-//! Checks of messages where they enter a process: the sender may be any program.
+//! Checks of messages where they enter a process: the sender may be any program. A violation is a
+//! sentence with the field, its value and its bounds.
 
 use std::{f64::consts::PI, fmt::Display, ops::RangeInclusive};
 
 use gyre_geometry::covariance;
-
-/// A violation of a message's contract: a sentence with the field, its value and its bounds.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct Violation(pub String);
 
 /// Tolerance for a yaw of pi, rad.
 const ROUNDING_RAD: f64 = 1e-9;
@@ -17,32 +13,22 @@ pub(crate) fn require(
     field: &str,
     value: impl Display,
     expected: impl Display,
-) -> Result<(), Violation> {
+) -> Result<(), String> {
     match holds {
         true => Ok(()),
-        false => Err(Violation(format!(
-            "{field} is {value}, but must be {expected}"
-        ))),
+        false => Err(format!("{field} is {value}, but must be {expected}")),
     }
 }
 
 /// Requires a value within bounds, and so a finite one.
-pub(crate) fn within(
-    field: &str,
-    value: f64,
-    bounds: RangeInclusive<f64>,
-) -> Result<(), Violation> {
+pub(crate) fn within(field: &str, value: f64, bounds: RangeInclusive<f64>) -> Result<(), String> {
     let (first, last) = bounds.clone().into_inner();
     let expected = format_args!("from {first} to {last}");
     require(bounds.contains(&value), field, value, expected)
 }
 
 /// Requires a code from 0 to `last`.
-pub(crate) fn code(
-    field: &str,
-    value: impl Into<u64>,
-    last: impl Into<u64>,
-) -> Result<(), Violation> {
+pub(crate) fn code(field: &str, value: impl Into<u64>, last: impl Into<u64>) -> Result<(), String> {
     let (value, last) = (value.into(), last.into());
     require(value <= last, field, value, format_args!("0 to {last}"))
 }
@@ -55,13 +41,13 @@ macro_rules! fields {
 }
 pub(crate) use fields;
 
-pub(crate) fn finite<const N: usize>(fields: [(&str, f64); N]) -> Result<(), Violation> {
+pub(crate) fn finite<const N: usize>(fields: [(&str, f64); N]) -> Result<(), String> {
     fields
         .into_iter()
         .try_for_each(|(field, value)| require(value.is_finite(), field, value, "finite"))
 }
 
-pub(crate) fn not_negative<const N: usize>(fields: [(&str, f64); N]) -> Result<(), Violation> {
+pub(crate) fn not_negative<const N: usize>(fields: [(&str, f64); N]) -> Result<(), String> {
     let holds = |value: f64| value >= 0.0 && value.is_finite();
     fields
         .into_iter()
@@ -69,23 +55,23 @@ pub(crate) fn not_negative<const N: usize>(fields: [(&str, f64); N]) -> Result<(
 }
 
 /// Names the part of a message whose field is wrong.
-pub(crate) fn of(part: &str, checked: Result<(), Violation>) -> Result<(), Violation> {
-    checked.map_err(|Violation(text)| Violation(format!("{part}{text}")))
+pub(crate) fn of(part: &str, checked: Result<(), String>) -> Result<(), String> {
+    checked.map_err(|text| format!("{part}{text}"))
 }
 
 /// Requires x and y (m) within `reach_m` and yaw (rad) within half a turn.
-pub(crate) fn planar([x, y, yaw]: [(&str, f64); 3], reach_m: f64) -> Result<(), Violation> {
+pub(crate) fn planar([x, y, yaw]: [(&str, f64); 3], reach_m: f64) -> Result<(), String> {
     within(x.0, x.1, -reach_m..=reach_m)?;
     within(y.0, y.1, -reach_m..=reach_m)?;
     within(yaw.0, yaw.1, -PI - ROUNDING_RAD..=PI + ROUNDING_RAD)
 }
 
-pub(crate) fn covariance(packed: &covariance::Packed) -> Result<(), Violation> {
+pub(crate) fn covariance(packed: &covariance::Packed) -> Result<(), String> {
     match covariance::is_positive_semidefinite(packed) {
         true => Ok(()),
-        false => Err(Violation(format!(
+        false => Err(format!(
             "covariance is {packed:?}, but must be finite and positive semidefinite"
-        ))),
+        )),
     }
 }
 
@@ -110,7 +96,7 @@ mod tests {
     };
 
     fn is_refused<M: Message>(header: &M::Header, payload: &[M::Element], start: &str) {
-        let violation = M::check(header, payload, &LIMITS).map_err(|it| it.to_string());
+        let violation = M::check(header, payload, &LIMITS);
         let is_it = violation.as_ref().is_err_and(|it| it.starts_with(start));
         assert!(is_it, "{start}: {violation:?}");
     }

@@ -4,10 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose as PlanarPose, UncertainMotion, covariance, pose};
 
 use crate::{
-    check::{
-        Violation, code, covariance as check_covariance, fields, finite, of, planar, require,
-        within,
-    },
+    check::{code, covariance as check_covariance, fields, finite, of, planar, require, within},
     item::{FollowerId, Item},
     limits::Limits,
     message::{Sender, header, message},
@@ -40,7 +37,7 @@ pub struct LoopHeader {
 }
 
 impl LoopHeader {
-    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), String> {
         let (later, earlier) = (self.later_seq, self.earlier_seq);
         let expected = format_args!("less than {later}, the later keyframe");
         require(earlier < later, "earlier_seq", earlier, expected)?;
@@ -86,7 +83,7 @@ pub struct CorrectionHeader {
 }
 
 impl CorrectionHeader {
-    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), String> {
         planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
         check_covariance(&self.keyframe_covariance)?;
         require(self.keyframes > 0, "keyframes", self.keyframes, "1 or more")
@@ -137,7 +134,7 @@ pub struct FixHeader {
 }
 
 impl FixHeader {
-    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), String> {
         planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
         check_covariance(&self.covariance)?;
         finite(fields![self; correlation])?;
@@ -216,7 +213,7 @@ impl ObjectsHeader {
         &self.list[..(self.listed as usize).min(MAX_LISTED)]
     }
 
-    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), String> {
         planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
         let fits = self.moving <= self.objects;
         require(fits, "moving", self.moving, "at most objects")?;
@@ -237,7 +234,7 @@ impl ListedObject {
         self.vx_mps.hypot(self.vy_mps)
     }
 
-    fn check(&self) -> Result<(), Violation> {
+    fn check(&self) -> Result<(), String> {
         planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
         within("length_m", self.length_m, 0.0..=MAX_SIZE_M)?;
         within("width_m", self.width_m, 0.0..=MAX_SIZE_M)?;

@@ -4,10 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use gyre_radar::{LostAzimuths, MAX_AZIMUTHS, lost::MAX_GAPS};
 
-use crate::{
-    check::{Violation, require},
-    limits::Window,
-};
+use crate::{check::require, limits::Window};
 
 pub mod flag {
     /// End of the stream: carries no scan and follows the last one in order.
@@ -165,7 +162,7 @@ impl Item {
         self.lost[..lost.gaps().len()].copy_from_slice(lost.gaps());
     }
 
-    pub(crate) fn check(&self) -> Result<(), Violation> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let known = self.flags & !flag::ALL == 0;
         require(known, "flags", self.flags, "bits of 1 to 8")?;
         let (scan, previous) = (self.scan, self.previous_scan);

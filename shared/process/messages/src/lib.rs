@@ -20,7 +20,6 @@ mod scan;
 mod topics;
 
 pub use basis::{Basis, WitnessCounts};
-pub use check::Violation;
 pub use follower::{
     Correction, CorrectionHeader, Fix, FixHeader, ListedObject, Loop, LoopHeader, MAX_LISTED,
     Objects, ObjectsHeader, fix_status,

@@ -6,7 +6,7 @@ use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    check::{Violation, code, fields, finite, not_negative, of, require},
+    check::{code, fields, finite, not_negative, of, require},
     item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
     message::{ByteBlock, FloatBlock, Message, Sender, header},
@@ -111,7 +111,7 @@ pub struct Pair<'a> {
 impl MaskedHeader {
     /// Checks the sizes, the length of the payload, and that the points are finite. The rasters are
     /// not looked at.
-    fn check_content(&self, payload: &[u8], limits: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, payload: &[u8], limits: &Limits) -> Result<(), String> {
         let values: &[f32] = bytemuck::cast_slice(payload);
         let (n, rasters, points) = (self.n as usize, self.rasters as usize, self.points as usize);
         require(n == limits.side(), "n", n, limits.side())?;
@@ -157,16 +157,16 @@ impl MaskedHeader {
         )?;
         let points = self.points(values).ok_or_else(|| {
             let bytes = payload.len();
-            Violation(format!("its payload of {bytes} bytes is shorter than its header states: {rasters} rasters of {n} x {n} cells and {points} points"))
+            format!("its payload of {bytes} bytes is shorter than its header states: {rasters} rasters of {n} x {n} cells and {points} points")
         })?;
         let is_finite =
             |point: &SparsePoint| <[f32; 5]>::from(*point).iter().all(|it| it.is_finite());
         match points.iter().position(|point| !is_finite(point)) {
             None => Ok(()),
-            Some(index) => Err(Violation(format!(
+            Some(index) => Err(format!(
                 "point {index} is {:?}, but must be finite",
                 points[index]
-            ))),
+            )),
         }
     }
 
@@ -186,19 +186,6 @@ impl MaskedHeader {
 
     pub fn velocity(&self) -> Option<DopplerVelocity> {
         (self.has_doppler == 1).then_some(self.doppler)
-    }
-
-    pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
-        (self.gyro, self.has_gyro) = (turn.unwrap_or_default(), turn.is_some().into());
-    }
-
-    pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
-        (self.wheels, self.has_wheels) = (distance.unwrap_or_default(), distance.is_some().into());
-    }
-
-    pub fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
-        (self.doppler, self.has_doppler) =
-            (velocity.unwrap_or_default(), velocity.is_some().into());
     }
 
     /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too

@@ -7,7 +7,6 @@ use std::fmt::Debug;
 use bytemuck::{Pod, Zeroable};
 
 use crate::{
-    check::Violation,
     item::{FollowerId, Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
 };
@@ -19,7 +18,7 @@ pub trait Header: Pod + Default + Debug {
     fn item(&self) -> &Item;
     fn item_mut(&mut self) -> &mut Item;
     /// Checks all but the item; the end of the stream has no content.
-    fn check(&self, payload: &[u8], limits: &Limits) -> Result<(), Violation>;
+    fn check(&self, payload: &[u8], limits: &Limits) -> Result<(), String>;
 }
 
 pub trait Element: Pod + Debug {
@@ -73,7 +72,7 @@ pub trait Message: Sized + 'static {
         header: &Self::Header,
         payload: &[Self::Element],
         limits: &Limits,
-    ) -> Result<(), Violation> {
+    ) -> Result<(), String> {
         let item = header.item();
         item.check()?;
         match item.is(flag::END) {
@@ -109,11 +108,7 @@ macro_rules! header {
                 &mut self.item
             }
 
-            fn check(
-                &self,
-                payload: &[u8],
-                limits: &$crate::limits::Limits,
-            ) -> Result<(), $crate::check::Violation> {
+            fn check(&self, payload: &[u8], limits: &$crate::limits::Limits) -> Result<(), String> {
                 self.check_content(payload, limits)
             }
         }
@@ -194,7 +189,7 @@ impl WireType {
 }
 
 /// Checks the bytes of a header and of a payload.
-type Check = fn(&[u8], &[u8], &Limits) -> Result<(), Violation>;
+type Check = fn(&[u8], &[u8], &Limits) -> Result<(), String>;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
@@ -210,7 +205,7 @@ pub struct Topic {
     pub content_bytes: fn(&[u8]) -> Option<usize>,
 }
 
-fn check<M: Message>(header: &[u8], payload: &[u8], limits: &Limits) -> Result<(), Violation> {
+fn check<M: Message>(header: &[u8], payload: &[u8], limits: &Limits) -> Result<(), String> {
     let payload = bytemuck::cast_slice(payload);
     M::check(bytemuck::from_bytes(header), payload, limits)
 }

@@ -8,7 +8,7 @@ use gyre_radar::MAX_INTERVAL_NS;
 use gyre_scan_matching::{MotionMatch, RotationMatch};
 
 use crate::{
-    check::{Violation, covariance as check_covariance, fields, finite, planar, require, within},
+    check::{covariance as check_covariance, fields, finite, planar, require, within},
     item::{Item, StageId},
     limits::Limits,
     message::{Sender, header, message},
@@ -37,7 +37,7 @@ pub struct RotationEstimate {
 }
 
 impl RotationEstimate {
-    pub(crate) fn check(&self) -> Result<(), Violation> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let turn = -PI..=PI;
         within("angle_rad", self.angle_rad, turn.clone())?;
         within("variance_rad2", self.variance_rad2, 0.0..=f64::MAX)?;
@@ -80,7 +80,7 @@ pub struct RotationHeader {
 }
 
 impl RotationHeader {
-    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), String> {
         self.rotation.check()
     }
 }
@@ -123,7 +123,7 @@ pub struct MotionEstimate {
 const MAX_EXTENTS: f64 = 10.0;
 
 impl MotionEstimate {
-    pub(crate) fn check(&self, limits: &Limits) -> Result<(), Violation> {
+    pub(crate) fn check(&self, limits: &Limits) -> Result<(), String> {
         let motion = fields![self; x_m y_m yaw_rad];
         planar(motion, MAX_EXTENTS * limits.extent_m())?;
         let [x_m, y_m, yaw_rad] = self.searched;
@@ -206,7 +206,7 @@ pub struct MotionHeader {
 }
 
 impl MotionHeader {
-    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), String> {
         self.motion.check(limits)
     }
 }

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{ComposedMotion, UncertainMotion, covariance, pose, xy_yaw};
 
 use crate::{
-    check::{Violation, covariance as check_covariance, fields, planar},
+    check::{covariance as check_covariance, fields, planar},
     item::{Item, StageId},
     limits::Limits,
     message::{Sender, header, message},
@@ -42,7 +42,7 @@ pub struct PoseHeader {
 pub(crate) const MAX_DISTANCE_M: f64 = 1e8;
 
 impl PoseHeader {
-    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), String> {
         planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
         check_covariance(&self.covariance)?;
         check_covariance(&self.accumulated_covariance)?;

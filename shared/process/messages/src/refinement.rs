@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::{InitialGuess, Outcome, Verdict};
 
-use crate::check::{Violation, code, fields, finite};
+use crate::check::{code, fields, finite};
 
 pub mod outcome {
     /// The searched motion: there is no refinement, or the chain starts here.
@@ -96,7 +96,7 @@ impl RefinementRecord {
         self.stationary != 0
     }
 
-    pub(crate) fn check(&self) -> Result<(), Violation> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         code("outcome", self.outcome, outcome::PREDICTED)?;
         code(
             "initial_guess",

@@ -7,7 +7,7 @@ use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
 use gyre_samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample};
 
 use crate::{
-    check::{Violation, require},
+    check::require,
     item::{Item, StageId},
     limits::{History, Limits, TopicSizes, Window},
     message::{ByteBlock, Message, Sender, header},
@@ -121,38 +121,36 @@ impl ScanHeader {
 
     /// Checks the geometry, the angles, the times and the samples, and that the length of the
     /// payload fits the geometry.
-    fn check_content(&self, bytes: &[u8], limits: &Limits) -> Result<(), Violation> {
+    fn check_content(&self, bytes: &[u8], limits: &Limits) -> Result<(), String> {
         let (length, azimuths) = (bytes.len(), self.azimuths as usize);
         let holds = (1..=MAX_AZIMUTHS).contains(&azimuths);
         let expected = format_args!("1 to {MAX_AZIMUTHS}");
         require(holds, "azimuths", azimuths, expected)?;
         let scan = self.view(bytes).ok_or_else(|| {
-            Violation(format!(
+            format!(
                 "its payload of {length} bytes is shorter than its header states: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
                 self.bins, self.stride, self.first_byte
-            ))
+            )
         })?;
         let checked = scan.check().and_then(|()| scan.check_times());
-        checked.map_err(|error| Violation(error.to_string()))?;
+        checked.map_err(|error| error.to_string())?;
         let (samples, most) = (self.samples, limits.samples);
         let expected = format_args!("at most {most}");
         require(samples as usize <= most, "samples", samples, expected)?;
         let samples = self.samples(bytes).ok_or_else(|| {
-            Violation(format!(
+            format!(
                 "its payload of {length} bytes is shorter than its header states: {samples} samples"
-            ))
+            )
         })?;
         if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {
             let sample = samples[index];
-            return Err(Violation(format!(
+            return Err(format!(
                 "sample {index} is {sample:?}, but must be of a known kind, finite, and at most {MAX_RATE_RADPS} rad/s or {MAX_SPEED_MPS} m/s"
-            )));
+            ));
         }
         match samples.is_sorted_by(|one, next| one.order() < next.order()) {
             true => Ok(()),
-            false => Err(Violation(
-                "a sample is not later than the one before".to_owned(),
-            )),
+            false => Err("a sample is not later than the one before".to_owned()),
         }
     }
 

@@ -37,13 +37,13 @@ pub struct LinkConfig {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub connect: Vec<String>,
     /// Certificate of the authority that has signed the certificates of both sides, PEM.
-    #[serde(skip_serializing_if = "crate::unset::is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub ca: PathBuf,
     /// Certificate of this side, PEM.
-    #[serde(skip_serializing_if = "crate::unset::is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub certificate: PathBuf,
     /// Private key of the certificate, PEM.
-    #[serde(skip_serializing_if = "crate::unset::is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub key: PathBuf,
     /// True if a robot sends masked scans beside a later cut: the keyframes of SLAM need them. Set
     /// by `slam.kind`.

@@ -36,7 +36,7 @@ pub struct RunConfig {
     /// longer, as one that cannot load its model, is treated as a stall.
     pub start_timeout_s: f64,
     /// The scheduling of the stages: priority, processors, memory. Followers have their own alone.
-    #[serde(skip_serializing_if = "is_default")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub scheduling: Scheduling,
     /// Longest time that a processor may take to wake from idleness, us; 0: none sleeps, which
     /// costs power. For the whole machine, while the run lives. It needs the right to write to
@@ -88,11 +88,11 @@ pub struct StageConfig {
     /// Limits of its restarts.
     pub restart: RestartPolicy,
     /// The scheduling of the process: its keys override `run.scheduling`.
-    #[serde(skip_serializing_if = "is_default")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub scheduling: Scheduling,
     /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have
     /// none.
-    #[serde(skip_serializing_if = "crate::unset::is_zero")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     #[schemars(skip)]
     pub delay_ms: u64,
 }
@@ -152,10 +152,6 @@ impl Default for RestartPolicy {
     fn default() -> Self {
         Self { limit: 5 }
     }
-}
-
-fn is_default(scheduling: &Scheduling) -> bool {
-    *scheduling == Scheduling::default()
 }
 
 impl Default for RunConfig {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct RecordConfig {
     /// The file of the run's recording, `NAME.mcap`; `--record` on the command line. Default: none.
-    #[serde(skip_serializing_if = "crate::unset::is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub file: PathBuf,
     /// The topics that are recorded: `scan`, `masked`, `rotation`, `motion`, `refined`, `pose`,
     /// `loop`, `correction`, `fix`, `log`, `health`. Default: all of these in the run except
@@ -18,21 +18,17 @@ pub struct RecordConfig {
     pub topics: Vec<String>,
     /// Size of a file before the recording continues in the next file, MB (rosbag2:
     /// `max_bagfile_size`, in bytes); 0: any.
-    #[serde(skip_serializing_if = "crate::unset::is_zero")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub split_mb: u64,
     /// Time of the sensor before the recording continues in the next file, s (rosbag2:
     /// `max_bagfile_duration`); 0: any.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub split_s: f64,
-}
-
-fn is_none(seconds: &f64) -> bool {
-    *seconds == 0.0
 }
 
 impl RecordConfig {
     /// Returns whether the run is recorded.
     pub fn is_on(&self) -> bool {
-        !crate::unset::is_empty(&self.file)
+        !self.file.as_os_str().is_empty()
     }
 }

@@ -55,7 +55,7 @@ pub struct SourceConfig {
     /// First topic that is played from a recording of a run: `scan`, `masked`, `rotation`, `motion`
     /// or `refined`; `--from` on the command line. The stages before it are absent. Of all but
     /// `scan` every message must have been recorded.
-    #[serde(skip_serializing_if = "is_scan")]
+    #[serde(skip_serializing_if = "crate::unset::is_default")]
     pub from: PlayedFrom,
     /// First scan to play, from 0.
     pub first: usize,
@@ -88,10 +88,6 @@ pub struct SourceConfig {
 
 fn is_one(value: &NonZeroUsize) -> bool {
     value.get() == 1
-}
-
-fn is_scan(from: &PlayedFrom) -> bool {
-    *from == PlayedFrom::Scan
 }
 
 impl Default for SourceConfig {

@@ -32,18 +32,9 @@ pub enum StageError {
     /// The input or the configuration cannot be used, and a restart would not change that.
     #[error("{0}")]
     Input(String),
-    /// Another attempt may help.
+    /// Another attempt may help, as after a failure of the transport.
     #[error("{0}")]
     Transient(String),
-    /// The transport failed; a restart usually helps.
-    #[error("cannot {action}: {reason}")]
-    Transport { action: String, reason: String },
-    #[error("topic `{topic}`: expected item {expected}, but got {got}")]
-    SequenceGap {
-        topic: &'static str,
-        expected: u64,
-        got: u64,
-    },
     #[error("topic `{topic}`, item {seq}, sent by {sender}: {reason}")]
     Malformed {
         topic: &'static str,
@@ -61,24 +52,19 @@ impl StageError {
     /// Exit code after an error that would occur again.
     pub const PERMANENT: u8 = 2;
 
-    pub fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
+    pub fn transport(action: impl Display, reason: impl Debug) -> Self {
         // The transport does not name this cause.
         let full = match shared_memory::is_full() {
             true => format!("; {SHARED_MEMORY} is full"),
             false => String::new(),
         };
-        Self::Transport {
-            action: action.into(),
-            reason: format!("{reason:?}{full}"),
-        }
+        Self::Transient(format!("cannot {action}: {reason:?}{full}"))
     }
 
-    pub(crate) fn gap(topic: &'static str, expected: u64, got: u64) -> Self {
-        Self::SequenceGap {
-            topic,
-            expected,
-            got,
-        }
+    pub fn gap(topic: &str, expected: u64, got: u64) -> Self {
+        Self::Transient(format!(
+            "topic `{topic}`: expected item {expected}, but got {got}"
+        ))
     }
 
     pub fn input(error: impl Display) -> Self {
@@ -102,10 +88,7 @@ impl StageError {
 
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Transport { .. }
-            | Self::SequenceGap { .. }
-            | Self::Malformed { .. }
-            | Self::Transient(_) => Self::TRANSIENT,
+            Self::Malformed { .. } | Self::Transient(_) => Self::TRANSIENT,
             _ => Self::PERMANENT,
         }
     }
@@ -124,10 +107,7 @@ impl From<LogError> for StageError {
     fn from(error: LogError) -> Self {
         match error {
             LogError::Foreign { .. } | LogError::Malformed { .. } => Self::Input(error.to_string()),
-            _ => Self::Transport {
-                action: "use a log of the run".to_owned(),
-                reason: error.to_string(),
-            },
+            _ => Self::Transient(format!("cannot use a log of the run: {error}")),
         }
     }
 }

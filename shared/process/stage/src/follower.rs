@@ -6,7 +6,7 @@ use std::{thread, time::Duration};
 
 use gyre_messages::{Header, Item, Message};
 
-pub use crate::log_id::{Growth, LogId};
+pub use crate::transport::Notifier;
 use crate::{
     Launch, Listener, Manifest, StageCounters, StageError,
     counters::Work,
@@ -17,6 +17,24 @@ use crate::{
 
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
+
+gyre_messages::named! {
+    /// A log of a run that followers read; its name is the event of its growth.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum LogId {
+        Keyframes = "keyframes_grown",
+        Loops = "loops_grown",
+        /// All scans with their points, by pose-integration.
+        Scans = "scans_grown",
+    }
+}
+
+impl LogId {
+    /// Opens the event that wakes the followers of the log, as the one process that appends to it.
+    pub fn growth(self, launch: &Launch) -> Result<Notifier, StageError> {
+        Notifier::open(&launch.node, self.name())
+    }
+}
 
 pub trait Follower {
     type Output: Message;
@@ -56,8 +74,8 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     launch.begin_heartbeat()?;
     let mut flow = Flow {
         output: Writer::open(&launch.node, &launch.manifest)?,
-        report: Numbers::open(&launch.manifest, &file_of(&launch.name), 0)?,
-        delay: launch.delay(),
+        report: Numbers::open(&launch.manifest, &file_of(&launch.name))?,
+        delay: launch.delay()?,
         next_seq: 0,
         counters: StageCounters::default(),
     };
@@ -72,7 +90,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
             follower.sync()?;
             return Ok(flow.counters);
         }
-        if woken.may_have_new_readers() {
+        if woken.may_have_new_readers {
             flow.output.accept_readers()?;
         }
         let slept = !limit.is_zero();
@@ -142,12 +160,8 @@ impl Progress {
 /// Returns the progress of a follower and whether it has come to its end; `None` before its first
 /// step.
 pub fn progress_of(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {
-    let [done, total, ended] = numbers::read(&manifest.root.join(file_of(follower)), 0)?;
+    let [done, total, ended] = numbers::read(&manifest.root.join(file_of(follower)))?;
     Some((Progress { done, total }, ended == 1))
-}
-
-pub fn is_done(manifest: &Manifest, follower: &str) -> bool {
-    progress_of(manifest, follower).is_some_and(|(_, has_ended)| has_ended)
 }
 
 fn file_of(follower: &str) -> String {

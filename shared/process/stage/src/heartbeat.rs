@@ -83,7 +83,7 @@ impl HeartbeatWriter {
     /// a later beat cannot.
     pub fn create(manifest: &Manifest, process: &str) -> Result<Self, StageError> {
         let name = file_of(process);
-        Numbers::open(manifest, &name, 0)?.write(now(Activity::Works))?;
+        Numbers::open(manifest, &name)?.write(now(Activity::Works))?;
         let path = manifest.root.join(name);
         let opened = OpenOptions::new().read(true).write(true).open(&path);
         let mapped = opened.and_then(|file| MmapOptions::new().len(16).map_raw(&file));
@@ -113,7 +113,7 @@ fn now(activity: Activity) -> [u64; 2] {
 
 /// Returns the newest beat of a process, if it writes any: a replacement need not.
 pub fn read(manifest: &Manifest, process: &str, pid: u32) -> Option<Heartbeat> {
-    let numbers = numbers::read(&manifest.root.join(file_of(process)), 0)?;
+    let numbers = numbers::read(&manifest.root.join(file_of(process)))?;
     // The process before has left its last one.
     Heartbeat::of(numbers).filter(|beat| beat.pid == pid)
 }

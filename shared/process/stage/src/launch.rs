@@ -1,11 +1,12 @@
 //! Start and end of a process of a run.
 
 use std::{
-    cell::Cell, fs, io::Write, os::fd::AsFd, path::PathBuf, process::ExitCode, sync::Mutex,
-    time::Duration,
+    cell::Cell, collections::BTreeMap, fs, io::Write, os::fd::AsFd, path::PathBuf,
+    process::ExitCode, sync::Mutex, time::Duration,
 };
 
 use gyre_messages::FollowerId;
+use gyre_run::{RunConfig, StageConfig};
 use rustix::{
     io::{Errno, ioctl_fionbio},
     mm::{MlockAllFlags, mlockall},
@@ -33,7 +34,7 @@ pub struct Launch {
     pub manifest: Manifest,
     pub signals: Signals,
     configuration: toml::Table,
-    pub(crate) node: Node,
+    pub node: Node,
     has_place: Cell<bool>,
     _log: EnteredSpan,
 }
@@ -118,16 +119,11 @@ impl Launch {
 
     /// Keeps all memory of this process from being paged out, if the configuration asks for it.
     fn lock_memory(&self) -> Result<(), StageError> {
-        let of = |table: Option<&toml::Value>| {
-            let key = table?.get("scheduling")?.get("lock_memory")?;
-            key.as_bool()
-        };
+        let is_follower = FollowerId::by_name(&self.name).is_some();
+        let run: RunConfig = self.section("run")?;
         // Followers have their own settings alone.
-        let run = match FollowerId::by_name(&self.name) {
-            Some(_) => None,
-            None => of(self.configuration.get("run")),
-        };
-        if !of(self.own_section()).or(run).unwrap_or_default() {
+        let of_run = run.scheduling.lock_memory && !is_follower;
+        if !of_run && !self.own_section()?.scheduling.lock_memory {
             return Ok(());
         }
         mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| {
@@ -137,16 +133,15 @@ impl Launch {
         })
     }
 
-    fn own_section(&self) -> Option<&toml::Value> {
-        self.configuration.get("stages")?.get(&self.name)
+    fn own_section(&self) -> Result<StageConfig, StageError> {
+        let mut stages: BTreeMap<String, StageConfig> = self.section("stages")?;
+        Ok(stages.remove(&self.name).unwrap_or_default())
     }
 
     /// Returns the delay that the configuration adds to the work on each item, to test behaviour
     /// under load.
-    pub(crate) fn delay(&self) -> Duration {
-        let own = self.own_section().and_then(|own| own.get("delay_ms"));
-        let delay_ms = own.and_then(toml::Value::as_integer).unwrap_or_default();
-        Duration::from_millis(delay_ms.max(0) as u64)
+    pub(crate) fn delay(&self) -> Result<Duration, StageError> {
+        Ok(Duration::from_millis(self.own_section()?.delay_ms))
     }
 
     /// Returns a section of the run's configuration, or its defaults if the section is missing.
@@ -163,10 +158,6 @@ impl Launch {
 
     pub fn has_section(&self, section: &str) -> bool {
         self.configuration.contains_key(section)
-    }
-
-    pub fn node(&self) -> &Node {
-        &self.node
     }
 }
 
@@ -194,25 +185,11 @@ pub fn main(
             // The span of the launch has ended.
             let stage = tracing::error_span!("process", stage = name);
             stage.in_scope(|| tracing::error!("{error}"));
-            let sentence = format!("{name}: {error}");
-            // Either fails if the disk is full.
+            // The supervisor reads the last line.
+            let sentence = format!("{name}: {error}").replace('\n', " ");
             let _ = writeln!(std::io::stderr(), "{sentence}");
-            // For the supervisor, in shared memory: the disk of the logs may be full.
-            if let Some(root) = std::env::var_os(run::ENVIRONMENT) {
-                let path = PathBuf::from(root).join(last_words(name, stands_by()));
-                let _ = run::write(path, &sentence);
-            }
             ExitCode::from(error.exit_code())
         }
-    }
-}
-
-/// Returns the name of the file in the run's root where a stage, or a process on standby, writes
-/// why it ended.
-pub fn last_words(stage: &str, stands_by: bool) -> String {
-    match stands_by {
-        true => format!("{stage}.standby.error"),
-        false => format!("{stage}.error"),
     }
 }
 

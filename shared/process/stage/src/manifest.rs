@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::StageError;
 
 /// The properties of a run that its processes need.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Manifest {
     pub prefix: String,
     pub root: PathBuf,

@@ -13,13 +13,11 @@ use crate::{Manifest, StageError, manifest};
 pub(crate) struct Numbers<const N: usize> {
     path: PathBuf,
     file: File,
-    /// Their position in the file, bytes.
-    at: u64,
     written: Option<[u64; N]>,
 }
 
 impl<const N: usize> Numbers<N> {
-    pub fn open(manifest: &Manifest, name: &str, at: u64) -> Result<Self, StageError> {
+    pub fn open(manifest: &Manifest, name: &str) -> Result<Self, StageError> {
         let path = manifest.root.join(name);
         Ok(Self {
             file: manifest::options()
@@ -27,7 +25,6 @@ impl<const N: usize> Numbers<N> {
                 .open(&path)
                 .map_err(StageError::file(&path))?,
             path,
-            at,
             written: None,
         })
     }
@@ -38,18 +35,18 @@ impl<const N: usize> Numbers<N> {
             return Ok(());
         }
         let bytes = numbers.map(u64::to_le_bytes);
-        let written = self.file.write_all_at(bytes.as_flattened(), self.at);
+        let written = self.file.write_all_at(bytes.as_flattened(), 0);
         written.map_err(StageError::file(&self.path))?;
         self.written = Some(numbers);
         Ok(())
     }
 }
 
-/// Returns numbers of a file; `None` where it has none.
-pub(crate) fn read<const N: usize>(path: &Path, at: u64) -> Option<[u64; N]> {
+/// Returns the first numbers of a file; `None` where it has fewer.
+pub(crate) fn read<const N: usize>(path: &Path) -> Option<[u64; N]> {
     let mut bytes = [[0; 8]; N];
     let file = File::open(path).ok()?;
-    file.read_exact_at(bytes.as_flattened_mut(), at).ok()?;
+    file.read_exact_at(bytes.as_flattened_mut(), 0).ok()?;
     Some(bytes.map(u64::from_le_bytes))
 }
 
@@ -60,14 +57,13 @@ mod tests {
     use crate::tests::Run;
 
     #[test]
-    fn numbers_are_read_as_they_were_written_at_their_place() {
+    fn numbers_are_read_as_they_were_written() {
         let run = Run::new();
-        let mut first = Numbers::<2>::open(&run.manifest, "numbers", 0).unwrap();
-        let mut second = Numbers::<1>::open(&run.manifest, "numbers", 16).unwrap();
-        first.write([1 << 40, u64::MAX]).unwrap();
+        let mut numbers = Numbers::<2>::open(&run.manifest, "numbers").unwrap();
+        numbers.write([1 << 40, u64::MAX]).unwrap();
         let path = run.manifest.root.join("numbers");
-        assert_eq!(read::<1>(&path, 16), None);
-        second.write([7]).unwrap();
-        assert_eq!(read(&path, 0), Some([1 << 40, u64::MAX, 7]));
+        assert_eq!(read::<3>(&path), None);
+        assert_eq!(read(&path), Some([1 << 40, u64::MAX]));
+        assert_eq!(read(&path), Some([1 << 40]));
     }
 }

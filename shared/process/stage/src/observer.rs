@@ -7,7 +7,7 @@ mod sequence;
 
 use std::{
     fs::File,
-    path::{Path, PathBuf},
+    path::Path,
     process, thread,
     time::{Duration, Instant},
 };
@@ -19,10 +19,10 @@ use crate::{
     heartbeat::HeartbeatWriter,
     message::{AnyMessage, RecordedMessage},
     numbers::{self, Numbers},
-    reader::{self, Port, Received},
+    reader::{self, Port, Received, Subscriber},
     run,
     sessions::not_running,
-    transport::{self, Node, Service, Subscriber},
+    transport::{self, Node, Service},
     wake::{self, Signals},
 };
 pub use sequence::Sequence;
@@ -111,12 +111,12 @@ impl ObservedRun {
     /// all topics are observed, and reports the waits for `signals` from here on.
     pub fn is_ready(&self, name: &str, signals: &Signals) -> Result<(), StageError> {
         signals.report_to(HeartbeatWriter::create(&self.manifest, name)?);
-        run::write(ready_file(&self.manifest.root), "")
+        run::write(run::ready_file(&self.manifest.root, name), "")
     }
 
     /// Reports to the supervisor how many messages its recorder, this process, has missed so far.
     pub fn tell_missed(&self, missed: u64) -> Result<(), StageError> {
-        let mut file = Numbers::open(&self.manifest, MISSED, 0)?;
+        let mut file = Numbers::open(&self.manifest, MISSED)?;
         file.write([process::id().into(), missed])
     }
 
@@ -193,15 +193,10 @@ impl ObservedRun {
     }
 }
 
-/// Returns the file in the run's root that the recorder writes when it observes all topics.
-pub fn ready_file(root: &Path) -> PathBuf {
-    root.join("recorder.ready")
-}
-
 /// Returns the number of missed messages that the recorder, this process, has reported; 0 without a
 /// report.
 pub fn read_missed(root: &Path, recorder: u32) -> u64 {
-    match numbers::read(&root.join(MISSED), 0) {
+    match numbers::read(&root.join(MISSED)) {
         Some([process, missed]) if process == u64::from(recorder) => missed,
         // The recorder before has left its own.
         _ => 0,

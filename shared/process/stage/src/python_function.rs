@@ -18,20 +18,6 @@ const PROGRAM: &str = include_str!("python_function/function.py");
 /// Room in the pipes, bytes: the most that a process may ask for without privileges.
 const PIPE_BYTES: usize = 1 << 20;
 
-gyre_messages::named! {
-    /// A function, whose name implies its arguments and results.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Name {
-        /// `mask(scan)`: factors from 0 to 1.
-        Mask = "mask",
-        /// `rotation(scan, previous)`: an angle, rad, and its standard deviation.
-        Rotation = "rotation",
-        /// `translation(scan, previous, rotation_rad)`: x, y, m, and their standard deviation or
-        /// covariance.
-        Translation = "translation",
-    }
-}
-
 pub enum Argument<'a> {
     Number(f64),
     Scan(Scan<'a>),
@@ -64,9 +50,9 @@ pub struct Function {
 }
 
 impl Function {
-    /// Starts the interpreter that `GYRE_PYTHON` names, or `python3`, and loads the file. Another
-    /// attempt helps where a process was killed or not to be had.
-    pub fn load(file: &Path, name: Name) -> Result<Self, StageError> {
+    /// Starts the interpreter that `GYRE_PYTHON` names, or `python3`, and loads the function of
+    /// this name in the file. Another attempt helps where a process was killed or not to be had.
+    pub fn load(file: &Path, name: &str) -> Result<Self, StageError> {
         let absolute = std::path::absolute(file).ok().filter(|file| file.is_file());
         let file = absolute
             .ok_or_else(|| StageError::Input(format!("there is no file {}", file.display())))?;
@@ -82,10 +68,7 @@ impl Function {
             }
         };
         let mut command = Command::new(&python);
-        command
-            .args(["-u", "-c", PROGRAM])
-            .arg(&file)
-            .arg(name.name());
+        command.args(["-u", "-c", PROGRAM]).arg(&file).arg(name);
         let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

@@ -10,7 +10,7 @@ use crate::{
     message::{AnyMessage, RecordedMessage},
     numbers::Numbers,
     reader::{Port, Reader},
-    remote_progress, sink,
+    schedule, sink,
     source::{Feed, hop},
     wake,
     writer::{TopicWriter, Writer, item_of},
@@ -135,7 +135,7 @@ impl<'a> LastStages<'a> {
         let motions = publishes_motions.then(|| Writer::open(node, manifest));
         Ok(Self {
             launch,
-            progress: remote_progress::begin(manifest)?,
+            progress: schedule::begin_elsewhere(manifest)?,
             motions: motions.transpose()?,
             poses: Writer::open(node, manifest)?,
             inlets: Vec::new(),
@@ -200,7 +200,7 @@ impl<'a> LastStages<'a> {
         let woken =
             signals.wait_or_readable(&data, &handshakes, Some(connection), wake::MAX_WAIT)?;
         self.counters.wakes += 1;
-        if woken.may_have_new_readers() {
+        if woken.may_have_new_readers {
             self.poses.accept_readers()?;
             let motions = self.motions.as_ref();
             motions.map_or(Ok(()), |motions| motions.accept_readers())?;

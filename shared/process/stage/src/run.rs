@@ -13,7 +13,7 @@ use rustix::{
 
 pub(crate) use crate::manifest::write;
 pub use crate::shared_memory::{SHARED_MEMORY, free_shared_memory};
-pub use root::{RootError, RunRoot, close_to_others, own_files, root_of, sweep, sweep_run};
+pub use root::{RunRoot, close_to_others, own_files, root_of, sweep, sweep_run};
 pub(crate) use root::{is_alive, roots};
 
 /// The environment variable with the path of the run's root.

@@ -2,6 +2,8 @@
 //! supervisor reads it, since only the source can distinguish a gap in the recording from a source
 //! that hangs. And the origin of its pace, for the source after it: scans of a live run become due
 //! whether a source is there or not.
+//!
+//! And the progress of stages on another machine: while those owe something, nobody here does.
 
 use crate::{
     Manifest, StageError, clock,
@@ -9,9 +11,8 @@ use crate::{
 };
 
 /// The name of the file in the run's root: [`Schedule::published`], then [`Schedule::due_ns`], then
-/// the origin of the pace, if there is one.
+/// the origin of the pace, which a replaced source may leave out; zeros without one.
 const FILE: &str = "source.schedule";
-const ORIGIN_AT: u64 = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Schedule {
@@ -28,8 +29,7 @@ impl Schedule {
 }
 
 pub(crate) struct ScheduleWriter {
-    file: Numbers<2>,
-    origin_file: Numbers<2>,
+    file: Numbers<4>,
     /// Items that the source before has published. No pose is due for them: they may be lost.
     pub before: u64,
     schedule: Schedule,
@@ -40,16 +40,16 @@ pub(crate) struct ScheduleWriter {
 impl ScheduleWriter {
     /// Creates the schedule of a source that has to begin now, maybe after a dead one.
     pub fn create(manifest: &Manifest) -> Result<Self, StageError> {
-        let origin: Option<[u64; 2]> = numbers::read(&manifest.root.join(FILE), ORIGIN_AT);
+        let [.., run_ns, sensor_ns]: [u64; 4] =
+            numbers::read(&manifest.root.join(FILE)).unwrap_or_default();
         let mut writer = Self {
-            file: Numbers::open(manifest, FILE, 0)?,
-            origin_file: Numbers::open(manifest, FILE, ORIGIN_AT)?,
+            file: Numbers::open(manifest, FILE)?,
             before: read(manifest).map_or(0, |before| before.published),
             schedule: Schedule {
                 published: 0,
                 due_ns: clock::now_ns(),
             },
-            origin: origin.map(|[run_ns, sensor_ns]| (run_ns as i64, sensor_ns as i64)),
+            origin: (run_ns != 0).then_some((run_ns as i64, sensor_ns as i64)),
         };
         writer.write()?;
         Ok(writer)
@@ -57,7 +57,7 @@ impl ScheduleWriter {
 
     pub fn is_paced_from(&mut self, origin: (i64, i64)) -> Result<(), StageError> {
         self.origin = Some(origin);
-        self.origin_file.write([origin.0 as u64, origin.1 as u64])
+        self.write()
     }
 
     pub fn due_at(&mut self, due_ns: i64) -> Result<(), StageError> {
@@ -72,15 +72,34 @@ impl ScheduleWriter {
 
     fn write(&mut self) -> Result<(), StageError> {
         let Schedule { published, due_ns } = self.schedule;
-        self.file.write([published, due_ns as u64])
+        let (run_ns, sensor_ns) = self.origin.unwrap_or_default();
+        let times = [due_ns, run_ns, sensor_ns].map(|ns| ns as u64);
+        self.file.write([published, times[0], times[1], times[2]])
     }
 }
 
 /// Returns the schedule of the run's source, if it has written one: a replaced source need not.
 pub fn read(manifest: &Manifest) -> Option<Schedule> {
-    let [published, due_ns] = numbers::read(&manifest.root.join(FILE), 0)?;
+    let [published, due_ns] = numbers::read(&manifest.root.join(FILE))?;
     Some(Schedule {
         published,
         due_ns: due_ns as i64,
     })
+}
+
+/// The name of the file in the run's root: one more than `Item::published` of the newest item that
+/// was handed over.
+const ELSEWHERE: &str = "elsewhere";
+
+/// Begins without the other machine, which has not reported where it continues.
+pub(crate) fn begin_elsewhere(manifest: &Manifest) -> Result<Numbers<1>, StageError> {
+    let mut file = Numbers::open(manifest, ELSEWHERE)?;
+    file.write([u64::MAX])?;
+    Ok(file)
+}
+
+/// Returns whether stages on another machine owe the pose of an item that was handed over to them,
+/// after so many poses.
+pub fn owes(manifest: &Manifest, poses: u64) -> bool {
+    numbers::read(&manifest.root.join(ELSEWHERE)).is_some_and(|[items]| items > poses)
 }

@@ -5,7 +5,7 @@ use gyre_messages::{FollowerId, Message, Pose, Sender, StageId, Topic, Window};
 
 use crate::{
     StageError,
-    log_id::LogId,
+    follower::LogId,
     transport::{Event, Node, Service},
 };
 

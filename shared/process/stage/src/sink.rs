@@ -47,33 +47,41 @@ pub fn run<S: Sink>(launch: &Launch, sink: &mut S) -> Result<StageCounters, Stag
     republish(&poses, &restored, S::HOP)?;
     let last = restored.last().map(|pose| pose.item);
     let next = last.map_or(0, |last| last.seq.saturating_add(1));
+    // Both have the same header.
+    let topic = match launch.manifest.refines {
+        true => Refined::ENTRY,
+        false => Motion::ENTRY,
+    };
+    if ended {
+        poses.end(last.unwrap_or_default(), Some(S::HOP))?;
+    }
+    let motions = Port::to(topic, &launch.node, &launch.manifest)?;
+    let scans = sink.takes_scans().then(|| Reader::open(launch, Some(next)));
     let mut integration = Integration {
         sink,
         poses,
+        motions: Reader::of(motions, Some(next)),
+        scans: scans.transpose()?,
         ended,
         counters: StageCounters::default(),
     };
-    if ended {
-        let last = last.unwrap_or_default();
-        integration.poses.end(last, Some(S::HOP))?;
-    }
-    let mut inputs = Motions::open(launch, next, integration.sink.takes_scans())?;
-    integration.drain(&mut inputs)?;
+    integration.drain()?;
     loop {
         let woken = launch.signals.wait(
-            &[inputs.listener()],
+            &[integration.listener()],
             Some(integration.poses.listener()),
             wake::MAX_WAIT,
         )?;
         integration.counters.wakes += 1;
         if woken.stop {
-            integration.counters.duplicates = inputs.duplicates();
+            let of_scans = integration.scans.as_ref().map_or(0, |it| it.duplicates);
+            integration.counters.duplicates = integration.motions.duplicates + of_scans;
             return Ok(integration.counters);
         }
-        if woken.may_have_new_readers() {
+        if woken.may_have_new_readers {
             integration.poses.accept_readers()?;
         }
-        if integration.drain(&mut inputs)? && woken.timed_out {
+        if integration.drain()? && woken.timed_out {
             integration.counters.wakes_caught_late += 1;
         }
     }
@@ -113,55 +121,54 @@ pub(crate) fn newest(mut pose: PoseHeader) -> PoseHeader {
     pose
 }
 
-struct Motions {
+struct Integration<'a, S: Sink> {
+    sink: &'a mut S,
+    poses: Writer<Pose>,
     motions: Reader<Motion>,
+    /// The scans of the motions, if the sink takes them.
     scans: Option<Reader<Masked>>,
+    ended: bool,
+    counters: StageCounters,
 }
 
-impl Motions {
-    fn open(launch: &Launch, next: u64, with_scans: bool) -> Result<Self, StageError> {
-        // Both have the same header.
-        let topic = match launch.manifest.refines {
-            true => Refined::ENTRY,
-            false => Motion::ENTRY,
-        };
-        let motions = Port::to(topic, &launch.node, &launch.manifest)?;
-        let scans = with_scans.then(|| Reader::open(launch, Some(next)));
-        Ok(Self {
-            motions: Reader::of(motions, Some(next)),
-            scans: scans.transpose()?,
-        })
-    }
-
-    /// Returns the current motion, and its scan if the sink takes scans. `None`: wait.
-    fn head(&mut self) -> Result<Option<Input<'_>>, StageError> {
-        let Some(received) = self.motions.head()? else {
-            return Ok(None);
-        };
-        let mut input = Input {
-            motion: *received.header(),
-            received_ns: received.received_ns,
-            scan: None,
-        };
-        if let Some(scans) = &mut self.scans {
-            let Some(head) = scans.head()? else {
-                return Ok(None);
+impl<S: Sink> Integration<'_, S> {
+    /// Integrates all motions in the queue; returns whether there were any.
+    fn drain(&mut self) -> Result<bool, StageError> {
+        let mut progressed = false;
+        while !self.ended {
+            let Some(head) = self.motions.head()? else {
+                break;
             };
-            if head.item().seq != input.motion.item.seq {
-                let expected = input.motion.item.seq;
-                return Err(StageError::gap(Masked::TOPIC, expected, head.item().seq));
+            let (mut motion, mut received_ns) = (*head.header(), head.received_ns);
+            let mut scan = None;
+            if let Some(scans) = &mut self.scans {
+                let Some(head) = scans.head()? else {
+                    break;
+                };
+                let (expected, got) = (motion.item.seq, head.item().seq);
+                if got != expected {
+                    return Err(StageError::gap(Masked::TOPIC, expected, got));
+                }
+                received_ns = received_ns.max(head.received_ns);
+                scan = Some(head);
             }
-            input.received_ns = input.received_ns.max(head.received_ns);
-            input.scan = Some(head);
+            if motion.item.is(flag::END) {
+                self.sink.end(&motion.item)?;
+                self.poses.end(motion.item, Some(S::HOP))?;
+                self.ended = true;
+            } else {
+                let work = Work::begin();
+                let hop = motion.item.hop_mut(S::HOP);
+                (hop.received_ns, hop.started_ns) = (received_ns, work.started_ns);
+                let pose = self.sink.integrate(&motion, scan)?;
+                work.end(&mut self.counters);
+                self.poses.publish(newest(pose), Some(S::HOP))?;
+            }
+            self.motions.release();
+            self.scans.iter_mut().for_each(Reader::release);
+            progressed = true;
         }
-        Ok(Some(input))
-    }
-
-    fn release(&mut self) {
-        self.motions.release();
-        if let Some(scans) = &mut self.scans {
-            scans.release();
-        }
+        Ok(progressed)
     }
 
     /// Returns the listener of the input that is missing, as
@@ -171,56 +178,5 @@ impl Motions {
             (Some(scans), Some(_)) => scans.listener(),
             _ => self.motions.listener(),
         }
-    }
-
-    fn duplicates(&self) -> u64 {
-        self.motions.duplicates + self.scans.as_ref().map_or(0, |scans| scans.duplicates)
-    }
-}
-
-struct Input<'a> {
-    motion: MotionHeader,
-    scan: Option<&'a Received<Masked>>,
-    /// Time when the last of them was received, `CLOCK_MONOTONIC`, ns.
-    received_ns: i64,
-}
-
-struct Integration<'a, S: Sink> {
-    sink: &'a mut S,
-    poses: Writer<Pose>,
-    ended: bool,
-    counters: StageCounters,
-}
-
-impl<S: Sink> Integration<'_, S> {
-    fn drain(&mut self, inputs: &mut Motions) -> Result<bool, StageError> {
-        let mut progressed = false;
-        while !self.ended {
-            let Some(input) = inputs.head()? else {
-                break;
-            };
-            let item = input.motion.item;
-            match item.is(flag::END) {
-                true => {
-                    self.sink.end(&item)?;
-                    self.poses.end(item, Some(S::HOP))?;
-                    self.ended = true;
-                }
-                false => self.integrate(input)?,
-            }
-            inputs.release();
-            progressed = true;
-        }
-        Ok(progressed)
-    }
-
-    fn integrate(&mut self, input: Input<'_>) -> Result<(), StageError> {
-        let work = Work::begin();
-        let mut motion = input.motion;
-        let hop = motion.item.hop_mut(S::HOP);
-        (hop.received_ns, hop.started_ns) = (input.received_ns, work.started_ns);
-        let pose = self.sink.integrate(&motion, input.scan)?;
-        work.end(&mut self.counters);
-        self.poses.publish(newest(pose), Some(S::HOP))
     }
 }

@@ -19,8 +19,10 @@ use std::{
 use rustix::thread::set_current_timer_slack;
 
 use gyre_messages::{ScanHeader, StageId};
+use gyre_run::SourceConfig;
 
 use crate::{Launch, StageCounters, StageError};
+pub use feed::Credit;
 pub(crate) use feed::{Feed, hop};
 use pace::Pace;
 use playback::Playback;
@@ -66,13 +68,13 @@ pub trait Source {
 pub fn run(
     launch: &Launch,
     source: &mut impl Source,
-    tolerance: &Tolerance,
+    config: &SourceConfig,
 ) -> Result<StageCounters, StageError> {
     launch.take_place()?;
     let mut playback = Playback {
         feed: Feed::of_scans(launch)?,
         source,
-        tolerance,
+        config,
     };
     // By default the system ends a wait up to 50 us late. If it refuses, scans are that late.
     let _ = set_current_timer_slack(NonZeroU64::new(1));
@@ -91,21 +93,13 @@ pub enum Unreadable {
     Io(String),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Tolerance {
-    /// Time for which failing input is tried again.
-    pub retry: Duration,
-    /// Number of damaged scans in a row that are skipped; one more ends the source.
-    pub max_unreadable: usize,
-}
-
 /// Opens the input of a source, and tries again while that fails with a sentence.
 pub fn open<T>(
     launch: &Launch,
-    tolerance: &Tolerance,
+    config: &SourceConfig,
     mut open: impl FnMut() -> Result<T, String>,
 ) -> Result<T, StageError> {
-    let mut attempts = Attempts::new(tolerance);
+    let mut attempts = Attempts::new(config);
     loop {
         match open() {
             Ok(input) => return Ok(input),
@@ -123,9 +117,9 @@ struct Attempts {
 }
 
 impl Attempts {
-    fn new(tolerance: &Tolerance) -> Self {
+    fn new(config: &SourceConfig) -> Self {
         Self {
-            retry: tolerance.retry,
+            retry: Duration::try_from_secs_f64(config.retry_s).unwrap_or(Duration::MAX),
             first_failure: None,
         }
     }

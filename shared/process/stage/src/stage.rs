@@ -43,7 +43,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, St
         signals: &launch.signals,
         inputs,
         output,
-        delay: launch.delay(),
+        delay: launch.delay()?,
         last: None,
         ended: false,
         counters: StageCounters::default(),
@@ -60,7 +60,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, St
             flow.counters.duplicates = flow.inputs.duplicates();
             return Ok(flow.counters);
         }
-        if woken.may_have_new_readers() {
+        if woken.may_have_new_readers {
             flow.output.accept_readers()?;
         }
         if flow.drain()? && woken.timed_out {

@@ -65,10 +65,7 @@ impl Run {
                 rasters: 1,
                 ..Limits::default()
             },
-            live: false,
-            refines: false,
-            rate: None,
-            build: String::new(),
+            ..Manifest::default()
         };
         manifest.write("").unwrap();
         let supervisor = node(&manifest);

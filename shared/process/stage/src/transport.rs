@@ -3,8 +3,9 @@
 //! and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other languages.
 
 mod event;
-mod port;
+pub mod reader;
 mod service;
+pub mod writer;
 
 use std::{fmt::Debug, path::Path};
 
@@ -20,11 +21,10 @@ use iceoryx2::{
 
 use crate::{Manifest, StageError};
 
-pub use event::Listener;
+pub(crate) use event::Event;
 #[cfg(test)]
 pub(crate) use event::bind_alone;
-pub(crate) use event::{Event, Notifier};
-pub(crate) use port::{Loan, Publisher, Sample, Subscriber};
+pub use event::{Listener, Notifier};
 pub use service::Service;
 
 type Ipc = ipc::Service;

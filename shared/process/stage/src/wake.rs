@@ -62,16 +62,9 @@ pub struct Signals {
 pub struct Woken {
     /// SIGTERM, SIGINT or SIGHUP has arrived, now or earlier.
     pub stop: bool,
-    pub child: bool,
-    pub handshake: bool,
+    /// True if a new reader has notified, or its notification may be lost.
+    pub may_have_new_readers: bool,
     pub timed_out: bool,
-}
-
-impl Woken {
-    /// Returns whether there may be new readers: one has notified, or its notification may be lost.
-    pub fn may_have_new_readers(&self) -> bool {
-        self.handshake || self.timed_out
-    }
 }
 
 impl Signals {
@@ -145,7 +138,9 @@ impl Signals {
         // Read only ready descriptors: each system call saved reduces latency.
         let mut ready = polled.iter().map(|polled| !polled.revents().is_empty());
         let mut next = || ready.next().unwrap_or(false);
-        let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));
+        let stop = next() && drain(&self.stop);
+        // Who waits for a child looks at it after each wait.
+        let _ = next() && drain(&self.child);
         for listener in data {
             if next() {
                 listener.take()?;
@@ -154,8 +149,7 @@ impl Signals {
         self.stopped.set(stop || self.stopped.get());
         Ok(Woken {
             stop: self.stopped.get(),
-            child,
-            handshake: handshakes.iter().filter(|_| next()).count() > 0,
+            may_have_new_readers: handshakes.iter().filter(|_| next()).count() > 0 || timed_out,
             timed_out,
         })
     }

@@ -2,9 +2,8 @@
 
 use std::{
     collections::VecDeque,
-    fs,
+    fmt,
     os::unix::process::ExitStatusExt,
-    path::PathBuf,
     process::ExitStatus,
     time::{Duration, Instant},
 };
@@ -12,16 +11,17 @@ use std::{
 use gyre_messages::StageId;
 use gyre_stage::{
     Manifest, StageError,
+    control::{Activity, ProcessStatus},
     heartbeat::{self, Heartbeat},
-    launch,
     run::SHARED_MEMORY,
 };
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use crate::{
-    Death, StagePlan, SuperviseError,
+    StagePlan, SuperviseError,
     end::ends_within,
     log::Log,
+    run::Run,
     start::{Position, Starter},
 };
 
@@ -42,7 +42,6 @@ pub(crate) struct Child {
     is_held: bool,
     deaths: VecDeque<Instant>,
     pose_at_restart: Option<Option<u64>>,
-    last_words: PathBuf,
     log: Log,
     pub last_death: Option<String>,
     /// Why the last program that was given up for this one could not be started.
@@ -55,12 +54,11 @@ pub(crate) struct Child {
 impl Child {
     pub fn spawn(
         plan: &StagePlan,
-        manifest: &Manifest,
         starter: &Starter<'_>,
         position: Position,
     ) -> Result<Self, SuperviseError> {
-        let log = Log::open(manifest, &plan.name)?;
-        let process = starter.start(plan, manifest, log.output(), position)?;
+        let log = Log::open(starter.manifest, &plan.name)?;
+        let process = starter.start(plan, log.output(), position)?;
         Ok(Self {
             plan: plan.clone(),
             process,
@@ -69,7 +67,6 @@ impl Child {
             is_held: false,
             deaths: VecDeque::new(),
             pose_at_restart: None,
-            last_words: last_words(manifest, &plan.name, position),
             log,
             last_death: None,
             start_error: None,
@@ -80,7 +77,6 @@ impl Child {
 
     pub fn respawn(
         &mut self,
-        manifest: &Manifest,
         starter: &Starter<'_>,
         newest_pose: Option<u64>,
     ) -> Result<(), SuperviseError> {
@@ -91,8 +87,7 @@ impl Child {
                 path.display()
             )));
         }
-        self.last_words = last_words(manifest, &self.plan.name, Position::Free);
-        self.process = starter.start(&self.plan, manifest, self.log.output(), Position::Free)?;
+        self.process = starter.start(&self.plan, self.log.output(), Position::Free)?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);
@@ -162,6 +157,35 @@ impl Child {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
+    /// Returns its state as `gyre ps` shows it; its activity is `otherwise` if it writes no
+    /// heartbeat.
+    pub fn status(&self, run: &Run<'_>, otherwise: Activity) -> ProcessStatus {
+        let beat = self.heartbeat(run.manifest());
+        let activity = match beat {
+            _ if self.is_known_to_have_exited() => Activity::Ended,
+            _ if run.is_starting(self) => Activity::Starting,
+            None => otherwise,
+            Some(beat) if beat.is_silent() => Activity::Silent,
+            Some(beat) => match beat.activity {
+                heartbeat::Activity::Works => Activity::Working,
+                heartbeat::Activity::Waits => Activity::Waiting,
+            },
+        };
+        ProcessStatus {
+            name: self.name().to_owned(),
+            pid: self.pid(),
+            command: self.plan.command.clone(),
+            is_swapped: false,
+            activity,
+            activity_s: beat.map(|beat| beat.age().as_secs_f64()),
+            uptime_s: self.started.elapsed().as_secs_f64(),
+            restarts: 0,
+            last_death: self.last_death.clone(),
+            missed: None,
+            received: None,
+        }
+    }
+
     pub fn has_outlived_its_window(&self) -> bool {
         self.started.elapsed() > RESTART_WINDOW
     }
@@ -229,7 +253,6 @@ impl Child {
         };
         self.last_death = Some(cause.clone());
         Death {
-            killed: status.signal().is_some(),
             cause,
             code: status.code(),
             last_output: self.last_output(),
@@ -251,7 +274,7 @@ impl Child {
     pub fn await_end(&mut self) -> Result<(), SuperviseError> {
         // After one wait in vain there is no second one.
         if !self.has_exited() && !self.is_held {
-            self.is_held = !ends_within(&self.process, KILL_TIMEOUT);
+            self.is_held = !ends_within(&mut self.process, KILL_TIMEOUT);
         }
         match self.has_exited() {
             true => Ok(()),
@@ -270,20 +293,37 @@ impl Child {
         }
     }
 
-    /// Returns the reason that the process gave, else the last line of its output.
+    /// Returns the last line of its output since the last call: the reason that it gave.
     pub fn last_output(&mut self) -> Option<String> {
-        let reason = fs::read_to_string(&self.last_words).ok();
-        let _ = fs::remove_file(&self.last_words);
-        let output = self.log.last_line();
-        // It is empty if shared memory was full.
-        reason.filter(|reason| !reason.is_empty()).or(output)
+        self.log.last_line()
     }
 }
 
-/// A process that stands by has its own file: the other is in use.
-fn last_words(manifest: &Manifest, name: &str, position: Position) -> PathBuf {
-    let stands_by = position == Position::Taken;
-    manifest.root.join(launch::last_words(name, stands_by))
+#[derive(Clone, Debug)]
+pub struct Death {
+    /// The cause, as `signal 9` or `exit code 3`.
+    pub cause: String,
+    /// `None`: it was killed.
+    pub code: Option<i32>,
+    pub last_output: Option<String>,
+}
+
+impl Death {
+    pub(crate) fn output(&self) -> String {
+        let line = self.last_output.as_ref();
+        line.map_or_else(String::new, |line| format!(" ({line})"))
+    }
+}
+
+/// The end of a sentence, as `it ended with exit code 3, its last line: ...`.
+impl fmt::Display for Death {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "it ended with {}", self.cause)?;
+        match &self.last_output {
+            Some(line) => write!(f, ", its last line: {line}"),
+            None => Ok(()),
+        }
+    }
 }
 
 impl Drop for Child {

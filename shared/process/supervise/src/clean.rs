@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
     sync::mpsc,
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use gyre_stage::{
@@ -19,9 +19,14 @@ use gyre_stage::{
     transport::Transport,
 };
 
-use crate::SuperviseError;
+use crate::{SuperviseError, run::Run};
 
 const LIMIT: Duration = Duration::from_secs(3);
+/// Time between two looks for killed observers.
+const PERIOD: Duration = Duration::from_secs(1);
+/// The same after a cleanup that failed or did not end. No stage needs it: every restart of a stage
+/// includes a cleanup.
+const PERIOD_AFTER_FAILURE: Duration = Duration::from_secs(30);
 /// Time after which a file that is still empty is not being created any more, which takes
 /// microseconds.
 const UNFINISHED: Duration = Duration::from_millis(200);
@@ -40,15 +45,30 @@ pub(crate) fn remove_dead(
 }
 
 /// Also removes the files that would make a stage wait for a stopped observer.
-pub(crate) fn remove_dead_observers(
-    manifest: &Manifest,
-    transport: &Transport,
-) -> Result<(), SuperviseError> {
+fn remove_dead_observers(manifest: &Manifest, transport: &Transport) -> Result<(), SuperviseError> {
     let (manifest, transport) = (manifest.clone(), transport.clone());
     within_limit(move || {
         unlink_unfinished_files(&manifest, &transport);
         clean(&manifest, &transport, false)
     })
+}
+
+/// Looks for killed observers beside the run's own processes; returns when to look again. At a low
+/// rate, since nothing informs the supervisor of their death.
+pub(crate) fn sweep_observers(run: &Run<'_>, processes: usize) -> Instant {
+    let has_observers = nodes(run.manifest()) > processes;
+    let failed = has_observers && remove_dead_observers(run.manifest(), &run.transport).is_err();
+    let period = match failed {
+        true => PERIOD_AFTER_FAILURE,
+        false => PERIOD,
+    };
+    Instant::now() + period
+}
+
+fn nodes(manifest: &Manifest) -> usize {
+    let entries = fs::read_dir(manifest.root.join("nodes")).into_iter();
+    let is_directory = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_dir());
+    entries.flatten().flatten().filter(is_directory).count()
 }
 
 fn within_limit(clean: impl Fn() -> bool + Clone + Send + 'static) -> Result<(), SuperviseError> {

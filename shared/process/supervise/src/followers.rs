@@ -3,12 +3,9 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::{
-    Manifest,
-    follower::{self, Progress},
-};
+use gyre_stage::follower::{self, Progress};
 
-use crate::{Ending, Plan, Stall, SuperviseError, roles::Roles};
+use crate::{Ending, Plan, Stall, SuperviseError};
 
 const MAX_STALLS: usize = 3;
 
@@ -40,9 +37,7 @@ impl Clock {
 }
 
 pub(crate) struct Followers<'a> {
-    roles: Roles<'a>,
-    manifest: &'a Manifest,
-    limit: Option<Duration>,
+    plan: &'a Plan,
     /// True when the stream has ended, and followers are waited for.
     pub are_awaited: bool,
     clock: Clock,
@@ -62,9 +57,7 @@ pub(crate) enum Patience {
 impl<'a> Followers<'a> {
     pub fn of(plan: &'a Plan) -> Self {
         Self {
-            roles: Roles::of(plan),
-            manifest: &plan.manifest,
-            limit: plan.stall_timeout,
+            plan,
             are_awaited: false,
             clock: Clock::default(),
             given_up: Vec::new(),
@@ -77,14 +70,14 @@ impl<'a> Followers<'a> {
 
     /// Returns whether a process is a follower that has not come to its end, and may still do so.
     pub fn is_behind(&self, process: usize) -> bool {
-        let is_done = || follower::is_done(self.manifest, self.roles.name(process));
-        self.roles.follows(process) && !self.has_given_up(process) && !is_done()
+        let is_done = || self.progress_of(process).1;
+        self.plan.follows(process) && !self.has_given_up(process) && !is_done()
     }
 
     /// No follower reads a log of one that was given up, or one behind it.
     pub fn behind(&self) -> Vec<usize> {
         let given_up = self.given_up.iter().map(|(follower, _)| *follower).min();
-        let followers = self.roles.followers();
+        let followers = self.plan.followers();
         let reach_the_end = followers.filter(|i| given_up.is_none_or(|first| *i < first));
         reach_the_end.filter(|i| self.is_behind(*i)).collect()
     }
@@ -97,18 +90,19 @@ impl<'a> Followers<'a> {
         }
     }
 
-    pub fn progress_of(&self, follower: usize) -> Progress {
-        follower::progress_of(self.manifest, self.roles.name(follower))
-            .map_or_else(Progress::default, |(progress, _)| progress)
+    /// Returns the progress of a follower, and whether it has come to its end.
+    pub fn progress_of(&self, follower: usize) -> (Progress, bool) {
+        let name = self.plan.name(follower);
+        follower::progress_of(&self.plan.manifest, name).unwrap_or_default()
     }
 
     pub fn judge(&mut self, follower: usize, progress: Progress, started: Instant) -> Patience {
         let waited = self.clock.look(follower, progress, started);
-        let Some(limit) = self.limit.filter(|limit| waited > *limit) else {
+        let Some(limit) = self.plan.stall_timeout.filter(|limit| waited > *limit) else {
             return Patience::Wait;
         };
         let stall = Stall::Follower {
-            follower: self.roles.name(follower).to_owned(),
+            follower: self.plan.name(follower).to_owned(),
             limit,
         };
         self.clock.stalls_in_a_row += 1;

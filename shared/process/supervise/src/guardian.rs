@@ -91,7 +91,7 @@ impl Guardian {
 impl Drop for Guardian {
     fn drop(&mut self) {
         self.groups = None;
-        if !ends_within(&self.process, STOP_TIMEOUT) {
+        if !ends_within(&mut self.process, STOP_TIMEOUT) {
             let _ = self.process.kill();
         }
         let _ = self.process.wait();
@@ -177,7 +177,7 @@ mod tests {
         let messages = [kept_id, forgotten_id, -forgotten_id].map(RawPid::to_ne_bytes);
         guard(messages.as_flattened(), None);
         assert_eq!(kept.wait().unwrap().signal(), Some(9));
-        assert!(!ends_within(&forgotten, Duration::from_millis(50)));
+        assert!(!ends_within(&mut forgotten, Duration::from_millis(50)));
         forgotten.kill().unwrap();
         forgotten.wait().unwrap();
     }

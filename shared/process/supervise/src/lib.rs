@@ -11,17 +11,14 @@
 
 mod child;
 mod clean;
-mod death;
 mod end;
 mod followers;
 mod guardian;
 mod log;
 pub mod memory;
-mod observers;
 mod plan;
 mod poses;
 mod process_stat;
-mod process_status;
 mod processes;
 mod program;
 mod recorder;
@@ -29,7 +26,6 @@ mod recovery;
 mod requests;
 mod restarts;
 pub mod rig;
-mod roles;
 mod run;
 mod scheduling;
 mod socket;
@@ -42,7 +38,7 @@ mod tests;
 mod usage;
 mod wake_limit;
 
-pub use death::Death;
+pub use child::Death;
 pub use guardian::guard;
 pub use gyre_run::{Ending, Scheduling, Swapped};
 pub use log::last_line;

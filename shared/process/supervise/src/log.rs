@@ -8,7 +8,6 @@ use std::{
     path::{Path, PathBuf},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     thread,
-    time::{Duration, Instant},
 };
 
 use gyre_stage::{Manifest, StageError};
@@ -17,11 +16,8 @@ use rustix::{
     io::{Errno, ioctl_fionbio},
 };
 
-use crate::Plan;
-
 /// Size of a log beyond which it is moved to its `.old`, bytes.
 const MAX: u64 = 8 << 20;
-const PERIOD: Duration = Duration::from_secs(1);
 
 /// The log of a supervisor that runs in the background, by its name in the folder of the logs.
 const BACKGROUND: &str = "gyre";
@@ -63,6 +59,7 @@ impl Log {
     fn at(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new()
             .create(true)
+            .read(true)
             .append(true)
             .mode(0o600)
             .open(path)?;
@@ -142,13 +139,7 @@ impl Collected {
         let bytes = &self.buffer[..bytes];
         // On a full disk it is lost but for its end.
         let _ = self.file.write_all(bytes);
-        if length(&self.file) > MAX {
-            bound(&self.path);
-            // A file that was removed or renamed meanwhile is not bounded by its name.
-            if length(&self.file) > MAX {
-                let _ = self.file.set_len(0);
-            }
-        }
+        bound(&self.file, &self.path);
         let newest = &bytes[bytes.len().saturating_sub(TAIL)..];
         self.tail.extend_from_slice(newest);
         let old = self.tail.len().saturating_sub(TAIL);
@@ -170,31 +161,14 @@ pub fn last_line(text: &str) -> Option<&str> {
     said.lines().rfind(|line| !is_silent(line))
 }
 
-/// The logs of a run where processes append directly, and which are kept short.
-pub(crate) struct Logs {
-    files: Vec<PathBuf>,
-    due: Instant,
-}
-
-impl Logs {
-    pub fn of(plan: &Plan) -> Self {
-        let background = path_of(&plan.manifest, BACKGROUND);
-        Self {
-            files: vec![plan.manifest.events(), background],
-            due: Instant::now(),
+/// Keeps the logs of a run short where processes append directly.
+pub(crate) fn bound_all(manifest: &Manifest) {
+    for path in [manifest.events(), path_of(manifest, BACKGROUND)] {
+        if fs::symlink_metadata(&path).is_ok_and(|log| log.is_file())
+            && let Ok(log) = OpenOptions::new().read(true).write(true).open(&path)
+        {
+            bound(&log, &path);
         }
-    }
-
-    pub fn bound_if_due(&mut self) {
-        let now = Instant::now();
-        if now >= self.due {
-            self.due = now + PERIOD;
-            self.bound();
-        }
-    }
-
-    pub fn bound(&self) {
-        self.files.iter().for_each(|file| bound(file));
     }
 }
 
@@ -203,22 +177,16 @@ fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
 }
 
 /// The processes that append to it do not notice.
-fn bound(path: &Path) {
-    let too_long = fs::symlink_metadata(path).is_ok_and(|log| log.is_file() && log.len() > MAX);
-    if !too_long {
-        return;
+fn bound(log: &File, path: &Path) {
+    if length(log) > MAX {
+        // On a full disk the end is lost: the space is needed more.
+        let _ = copy_end(log, path);
+        let _ = log.set_len(0);
     }
-    // On a full disk the end is lost: the space is needed more.
-    let _ = copy_end(path);
-    let _ = OpenOptions::new()
-        .write(true)
-        .open(path)
-        .and_then(|log| log.set_len(0));
 }
 
-fn copy_end(path: &Path) -> io::Result<()> {
-    let mut log = File::open(path)?;
-    log.seek(SeekFrom::Start(length(&log).saturating_sub(MAX)))?;
+fn copy_end(mut log: &File, path: &Path) -> io::Result<()> {
+    log.seek(SeekFrom::Start(length(log).saturating_sub(MAX)))?;
     let mut name = path.as_os_str().to_owned();
     name.push(".old");
     let mut old = OpenOptions::new()

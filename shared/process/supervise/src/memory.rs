@@ -7,33 +7,13 @@ use std::{
 
 const CGROUPS: &str = "/sys/fs/cgroup";
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
-    /// Bytes that programs of the machine can still allocate, if the kernel reports them.
-    pub available: Option<u64>,
-    /// The lowest limit of the control groups, bytes.
-    pub limit: Option<u64>,
-    /// The least that the control groups leave, bytes.
-    pub left: Option<u64>,
-}
-
-impl Room {
-    pub fn now() -> Self {
-        let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-        let groups = limits(Path::new(CGROUPS), &groups);
-        Self {
-            available: available(&fs::read_to_string("/proc/meminfo").unwrap_or_default()),
-            limit: groups.iter().map(|group| group.limit).min(),
-            left: groups
-                .iter()
-                .map(|group| group.limit.saturating_sub(group.used))
-                .min(),
-        }
-    }
-
-    pub fn least(&self) -> Option<u64> {
-        self.available.into_iter().chain(self.left).min()
-    }
+/// Returns the bytes that programs can still allocate: the least that the machine and the control
+/// groups leave, as far as the kernel reports it.
+pub fn left() -> Option<u64> {
+    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let left = left_by_groups(Path::new(CGROUPS), &groups);
+    let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    available(&meminfo).into_iter().chain(left).min()
 }
 
 fn available(meminfo: &str) -> Option<u64> {
@@ -44,15 +24,9 @@ fn available(meminfo: &str) -> Option<u64> {
     Some(kilobytes * 1024)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Group {
-    limit: u64,
-    used: u64,
-}
-
-/// Returns the limits of the control groups in `/proc/self/cgroup` (version 1 or 2) and of those
-/// above them.
-fn limits(root: &Path, groups: &str) -> Vec<Group> {
+/// Returns what the control groups in `/proc/self/cgroup` (version 1 or 2) leave, and those above
+/// them that have a limit.
+fn left_by_groups(root: &Path, groups: &str) -> Vec<u64> {
     let hierarchies = groups.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':').skip(1);
         let (controllers, group) = (fields.next()?, fields.next()?.trim_start_matches('/'));
@@ -69,16 +43,15 @@ fn limits(root: &Path, groups: &str) -> Vec<Group> {
             .collect();
         above.into_iter().map(move |folder| (folder, files))
     });
-    let number = |path: PathBuf| fs::read_to_string(path).ok()?.trim().parse().ok();
+    let number =
+        |path: PathBuf| -> Option<u64> { fs::read_to_string(path).ok()?.trim().parse().ok() };
     folders
         .filter_map(|(folder, (limit, used))| {
-            Some(Group {
-                limit: number(folder.join(limit))?,
-                used: number(folder.join(used)).unwrap_or(0),
-            })
+            let limit = number(folder.join(limit))?;
+            let used = number(folder.join(used)).unwrap_or(0);
+            // Version 1 writes the largest multiple of a page where there is no limit.
+            (limit < i64::MAX as u64 / 2).then(|| limit.saturating_sub(used))
         })
-        // Version 1 writes the largest multiple of a page where there is no limit.
-        .filter(|group| group.limit < i64::MAX as u64 / 2)
         .collect()
 }
 
@@ -104,15 +77,14 @@ mod tests {
         write("user/memory.current", "1000000\n");
         write("memory/box/memory.limit_in_bytes", "3000000\n");
         write("memory/memory.limit_in_bytes", "9223372036854771712\n");
-        let groups = |groups| limits(root.path(), groups);
-        let group = |limit, used| Group { limit, used };
-        assert_eq!(groups("0::/user/session\n"), [group(5_000_000, 1_000_000)]);
-        assert_eq!(
-            groups("8:pids:/\n4:memory:/box\n0::/\n"),
-            [group(3_000_000, 0)]
-        );
-        assert_eq!(groups("4:memory:/\n"), []);
-        assert_eq!(groups(""), []);
+        for (groups, left) in [
+            ("0::/user/session\n", vec![4_000_000]),
+            ("8:pids:/\n4:memory:/box\n0::/\n", vec![3_000_000]),
+            ("4:memory:/\n", vec![]),
+            ("", vec![]),
+        ] {
+            assert_eq!(left_by_groups(root.path(), groups), left, "{groups}");
+        }
     }
 
     #[test]

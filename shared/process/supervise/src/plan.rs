@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::PoseHeader;
+use gyre_messages::{FollowerId, PoseHeader, StageId};
 use gyre_run::{RestartPolicy, Scheduling};
 use gyre_stage::{Manifest, StageError, follower::Progress};
 use thiserror::Error;
@@ -30,6 +30,59 @@ pub struct Plan {
     /// Longest time that a processor of the machine may take to wake while the run lives, us;
     /// `None`: as the system has it.
     pub cpu_wake_us: Option<u32>,
+}
+
+/// The roles of the processes, which are indices into [`Plan::stages`]: which of them a restart
+/// concerns. A swap does not change them.
+impl Plan {
+    pub(crate) fn name(&self, process: usize) -> &str {
+        &self.stages[process].name
+    }
+
+    pub(crate) fn follows(&self, process: usize) -> bool {
+        FollowerId::by_name(self.name(process)).is_some()
+    }
+
+    pub(crate) fn named(&self, name: &str) -> Option<usize> {
+        self.stages.iter().position(|plan| plan.name == name)
+    }
+
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.stages.iter().map(|plan| plan.name.as_str())
+    }
+
+    pub(crate) fn in_stream(&self) -> impl Iterator<Item = usize> {
+        (0..self.stages.len()).filter(move |process| !self.follows(*process))
+    }
+
+    pub(crate) fn followers(&self) -> impl Iterator<Item = usize> {
+        (0..self.stages.len()).filter(move |process| self.follows(*process))
+    }
+
+    pub(crate) fn sources(&self) -> Vec<usize> {
+        let is_source = |name| StageId::by_name(name) == Some(StageId::RadarReplay);
+        let all = 0..self.stages.len();
+        all.filter(|process| is_source(self.name(*process)))
+            .collect()
+    }
+
+    /// Returns all stages except those that are alive and outlive restarts.
+    pub(crate) fn all_but_survivors(&self, dead: &[usize]) -> Vec<usize> {
+        let survives = |i: &usize| self.stages[*i].outlives_restarts && !dead.contains(i);
+        self.in_stream().filter(|i| !survives(i)).collect()
+    }
+
+    /// Returns whether the restart of a process alone does not recover its state.
+    pub(crate) fn restarts_all(&self, process: usize) -> bool {
+        self.stages[process].restarts_all
+    }
+
+    pub(crate) fn restarted_with(&self, process: usize) -> Vec<usize> {
+        match self.restarts_all(process) {
+            true => self.all_but_survivors(&[process]),
+            false => vec![process],
+        }
+    }
 }
 
 #[derive(Clone, Debug)]

@@ -17,11 +17,6 @@ pub(crate) struct Poses {
     seen: Option<Instant>,
 }
 
-pub(crate) enum News {
-    Pose(Received<Pose>),
-    End,
-}
-
 impl Poses {
     pub fn of(run: &Run<'_>) -> Result<Self, StageError> {
         Ok(Self {
@@ -32,15 +27,15 @@ impl Poses {
     }
 
     /// Returns the next new pose, or the end; `None` if nothing has come.
-    pub fn next(&mut self) -> Result<Option<News>, StageError> {
+    pub fn next(&mut self) -> Result<Option<Received<Pose>>, StageError> {
         while let Some(received) = self.port.receive()? {
             let item = *received.item();
             if item.is(flag::END) {
-                return Ok(Some(News::End));
+                return Ok(Some(received));
             }
             if is_new(self.newest.as_ref(), &item) {
                 (self.newest, self.seen) = (Some(item), Some(Instant::now()));
-                return Ok(Some(News::Pose(received)));
+                return Ok(Some(received));
             }
         }
         Ok(None)

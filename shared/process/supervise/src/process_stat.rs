@@ -5,7 +5,6 @@ use std::{fs, str::FromStr};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ProcessStat {
     pub pid: u32,
-    pub parent: u32,
     pub group: u32,
     /// True if it has ended, and nobody has waited for it yet.
     pub has_ended: bool,
@@ -33,7 +32,6 @@ impl ProcessStat {
         let (user, system): (u64, u64) = (field(&fields, 11)?, field(&fields, 12)?);
         Some(Self {
             pid,
-            parent: field(&fields, 1)?,
             group: field(&fields, 2)?,
             has_ended: matches!(*fields.first()?, "Z" | "X"),
             cpu_s: (user + system) as f64 / rustix::param::clock_ticks_per_second() as f64,
@@ -59,7 +57,7 @@ mod tests {
         let of_child = || ProcessStat::all().find(|it| it.pid == child.id());
         let stat = of_child().unwrap();
         let own = ProcessStat::of(std::process::id()).unwrap();
-        assert_eq!((stat.parent, stat.group), (own.pid, own.group));
+        assert_eq!(stat.group, own.group);
         assert!(!stat.has_ended && stat.started >= own.started);
         rustix::process::kill_process(
             rustix::process::Pid::from_child(&child),
@@ -75,7 +73,7 @@ mod tests {
     fn a_name_may_hold_parentheses_and_spaces() {
         let stat = "7 (a) b (c) S 3 5 5 0 -1 4194560 1 2 3 4 150 50 7 8 20 0 1 0 999 1 2";
         let parsed = ProcessStat::parse(7, stat).unwrap();
-        assert_eq!((parsed.parent, parsed.group, parsed.started), (3, 5, 999));
+        assert_eq!((parsed.group, parsed.started), (5, 999));
         assert!(!parsed.has_ended && parsed.cpu_s > 0.0);
         assert_eq!(ProcessStat::parse(7, "7 (a) S 3 5"), None);
     }

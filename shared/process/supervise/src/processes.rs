@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    ops::{Index, IndexMut},
+    ops::{Deref, DerefMut},
     time::{Duration, Instant},
 };
 
@@ -10,8 +10,8 @@ use gyre_messages::PoseHeader;
 use gyre_stage::wake;
 
 use crate::{
-    END_TIMEOUT, Ending, Event, SuperviseError, child::Child, followers::Followers,
-    guardian::Guardian, recovery::Recovery, roles::Roles, run::Run, start::Position,
+    END_TIMEOUT, Ending, Event, Plan, SuperviseError, child::Child, followers::Followers,
+    guardian::Guardian, recovery::Recovery, run::Run, start::Position,
 };
 
 #[derive(Default)]
@@ -20,17 +20,17 @@ pub(crate) struct Processes {
     pub restarts: BTreeMap<String, usize>,
 }
 
-impl Index<usize> for Processes {
-    type Output = Child;
+impl Deref for Processes {
+    type Target = [Child];
 
-    fn index(&self, process: usize) -> &Child {
-        &self.children[process]
+    fn deref(&self) -> &[Child] {
+        &self.children
     }
 }
 
-impl IndexMut<usize> for Processes {
-    fn index_mut(&mut self, process: usize) -> &mut Child {
-        &mut self.children[process]
+impl DerefMut for Processes {
+    fn deref_mut(&mut self) -> &mut [Child] {
+        &mut self.children
     }
 }
 
@@ -38,33 +38,21 @@ impl Processes {
     pub fn start(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
         let plan = run.plan;
         for stage in &plan.stages {
-            let child = Child::spawn(stage, &plan.manifest, &run.starter(), Position::Free)?;
+            let child = Child::spawn(stage, &run.starter(), Position::Free)?;
             run.note(&format!("{:20} pid {}", stage.name, child.pid()));
             self.children.push(child);
         }
         Ok(())
     }
 
-    pub fn len(&self) -> usize {
-        self.children.len()
-    }
-
-    pub fn iter(&self) -> impl Iterator<Item = &Child> {
-        self.children.iter()
-    }
-
     /// Returns the followers and the stages that have ended.
-    pub fn ended(&mut self, roles: Roles<'_>) -> (Vec<usize>, Vec<usize>) {
+    pub fn ended(&mut self, plan: &Plan) -> (Vec<usize>, Vec<usize>) {
         let children = self.children.iter_mut().enumerate();
         let ended = children.filter_map(|(i, child)| child.has_exited().then_some(i));
-        ended.partition(|i| roles.follows(*i))
+        ended.partition(|i| plan.follows(*i))
     }
 
-    pub fn are_ready(&self, run: &Run<'_>) -> bool {
-        let mut stages = self.iter().filter(|child| child.stage().is_some());
-        stages.all(|stage| !run.is_starting(stage))
-    }
-
+    /// Returns the stage that has been opening its topics for longest.
     pub fn starting(&self, run: &Run<'_>) -> Option<&Child> {
         let opening = self.iter().filter(|child| run.is_starting(child));
         opening.min_by_key(|child| child.started)

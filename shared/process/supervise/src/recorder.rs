@@ -4,16 +4,14 @@
 use std::time::{Duration, Instant};
 
 use gyre_stage::{
-    Manifest,
     control::{Activity, ProcessStatus},
     observer,
+    run::ready_file,
 };
 
 use crate::{
     Ending, Event, SuperviseError,
     child::{Child, RESTART_BACKOFF},
-    death::Death,
-    process_status::{activity, of_child},
     run::Run,
     start::Position,
 };
@@ -28,8 +26,7 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 pub(crate) struct Recorder {
     child: Child,
-    /// `None` while it runs, and when it has ended for good.
-    restart_at: Option<Instant>,
+    /// True when it has ended for good.
     has_ended: bool,
     restarts: usize,
 }
@@ -41,14 +38,14 @@ impl Recorder {
         let Some(plan) = &run.plan.recorder else {
             return Ok(None);
         };
-        let mut child = match Child::spawn(plan, run.manifest(), &run.starter(), Position::Free) {
+        let mut child = match Child::spawn(plan, &run.starter(), Position::Free) {
             Err(SuperviseError::Process(reason)) => {
                 run.note(&reason);
                 return Ok(None);
             }
             spawned => spawned?,
         };
-        let ready = observer::ready_file(&run.manifest().root);
+        let ready = ready_file(&run.manifest().root, &plan.name);
         let started = Instant::now();
         while started.elapsed() < START_TIMEOUT && !ready.exists() && !child.has_exited() {
             if run.sleep(LOOK)? {
@@ -57,7 +54,6 @@ impl Recorder {
         }
         Ok(Some(Self {
             child,
-            restart_at: None,
             has_ended: false,
             restarts: 0,
         }))
@@ -75,44 +71,30 @@ impl Recorder {
         if self.has_ended || !self.child.has_exited() {
             return Ok(());
         }
-        match self.restart_at {
-            None => {
-                run.guardian.forget(self.child.pid());
-                let death = self.child.death();
-                run.note(&self.judge(death));
-                Ok(())
-            }
-            Some(restart_at) if Instant::now() < restart_at => Ok(()),
-            Some(_) => self.respawn(run, newest),
-        }
-    }
-
-    /// Decides whether a recorder that has just died is started again. Returns a sentence.
-    fn judge(&mut self, death: Death) -> String {
-        match self.child.may_restart(&death) {
+        run.guardian.forget(self.child.pid());
+        let death = self.child.death();
+        let sentence = match self.child.may_restart(&death) {
             // It was asked to stop.
-            _ if death.code == Some(0) => {
-                self.has_ended = true;
-                death.last_output.unwrap_or_default()
-            }
+            _ if death.code == Some(0) => death.last_output.unwrap_or_default(),
+            Err(error) => error.to_string(),
             Ok(()) => {
-                self.restart_at = Some(Instant::now() + RESTART_BACKOFF);
-                format!(
+                run.note(&format!(
                     "the recorder died ({}), and is started again: it continues in a different file",
                     death.cause
-                )
+                ));
+                run.pause(RESTART_BACKOFF)?;
+                return self.respawn(run, newest);
             }
-            Err(error) => {
-                self.has_ended = true;
-                error.to_string()
-            }
-        }
+        };
+        self.has_ended = true;
+        run.note(&sentence);
+        Ok(())
     }
 
     fn respawn(&mut self, run: &mut Run<'_>, newest: Option<u64>) -> Result<(), SuperviseError> {
-        (self.restart_at, self.has_ended) = (None, false);
+        self.has_ended = false;
         self.restarts += 1;
-        let respawned = self.child.respawn(run.manifest(), &run.starter(), newest);
+        let respawned = self.child.respawn(&run.starter(), newest);
         match respawned {
             Err(SuperviseError::Process(reason)) => {
                 self.has_ended = true;
@@ -129,11 +111,6 @@ impl Recorder {
         run: &mut Run<'_>,
         ending: Option<Ending>,
     ) -> Result<(), SuperviseError> {
-        if self.restart_at.is_some() {
-            run.note(
-                "the recorder died, and the run ended before it was started again: the end of the recording is missing",
-            );
-        }
         let limit = match ending {
             Some(Ending::Complete) => END_TIMEOUT,
             _ => STOP_TIMEOUT,
@@ -152,25 +129,20 @@ impl Recorder {
         self.respawn(run, newest)
     }
 
-    pub fn status(&self, manifest: &Manifest) -> ProcessStatus {
-        let beat = self.child.heartbeat(manifest);
-        let activity = match beat {
-            _ if self.child.is_known_to_have_exited() => Activity::Ended,
-            // It beats from when it observes all topics.
-            None => Activity::Starting,
-            Some(beat) => activity(beat),
-        };
+    pub fn status(&self, run: &Run<'_>) -> ProcessStatus {
+        let root = &run.manifest().root;
         ProcessStatus {
             restarts: self.restarts,
-            missed: Some(observer::read_missed(&manifest.root, self.child.pid())),
-            ..of_child(&self.child, beat, activity)
+            missed: Some(observer::read_missed(root, self.child.pid())),
+            // It beats from when it observes all topics.
+            ..self.child.status(run, Activity::Starting)
         }
     }
 
     /// Asks the recorder to write its received messages, and kills it if it has not finished after
     /// `limit`.
     fn end(&mut self, run: &mut Run<'_>, limit: Duration) -> Result<(), SuperviseError> {
-        if self.has_ended || self.restart_at.is_some() {
+        if self.has_ended {
             return Ok(());
         }
         self.child.terminate();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use gyre_messages::{PoseHeader, StageId};
 use gyre_stage::clock;
 
-use crate::roles::Roles;
+use crate::Plan;
 
 #[derive(Default)]
 pub(crate) struct Recovery {
@@ -58,12 +58,12 @@ impl Recovery {
 /// restart of one alone does not recover its state, or has not helped before.
 pub(crate) fn restarted_after(
     dead: &[usize],
-    roles: Roles<'_>,
+    plan: &Plan,
     died_without_progress: impl Fn(usize) -> bool,
 ) -> Vec<usize> {
-    let needs_all = |i: &usize| died_without_progress(*i) || roles.restarts_all(*i);
+    let needs_all = |i: &usize| died_without_progress(*i) || plan.restarts_all(*i);
     match dead.iter().any(needs_all) {
-        true => roles.all_but_survivors(dead),
+        true => plan.all_but_survivors(dead),
         false => dead.to_vec(),
     }
 }
@@ -76,9 +76,8 @@ mod tests {
     #[test]
     fn a_dead_stage_is_restarted_alone_unless_that_has_not_helped() {
         let mut plan = plan();
-        let after = |plan: &_, dead: &[usize], is_stuck: bool| {
-            restarted_after(dead, Roles::of(plan), |_| is_stuck)
-        };
+        let after =
+            |plan: &_, dead: &[usize], is_stuck: bool| restarted_after(dead, plan, |_| is_stuck);
         assert_eq!(after(&plan, &[MASKING], false), [MASKING]);
         let all = [SOURCE, MASKING, REFINEMENT];
         assert_eq!(after(&plan, &[MASKING], true), all);

@@ -2,16 +2,18 @@
 
 use std::{env, path::Path, process};
 
+use gyre_messages::StageId;
 use gyre_stage::{
     StageError, clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
     schedule, sink,
+    source::received_of,
     wake::{MAX_WAIT, Signals},
 };
 
 use crate::{
     StagePlan, SuperviseError,
-    process_status::status_of,
+    child::Child,
     socket::{Client, ControlSocket},
     supervisor::Supervisor,
     swaps::{Standby, Step, plan_of},
@@ -72,7 +74,7 @@ impl Supervisor<'_> {
     }
 
     fn refuse_unknown(&self, process: &str, client: Client) {
-        let names: Vec<&str> = self.run.roles().names().collect();
+        let names: Vec<&str> = self.run.plan.names().collect();
         let names = names.join(", ");
         client.answer(&Answer::Refused(format!(
             "the run has no process `{process}`; it has {names}"
@@ -81,7 +83,7 @@ impl Supervisor<'_> {
 
     /// It counts as a restart and not as a death.
     fn restart_on_request(&mut self, name: &str, client: Client) -> Result<(), SuperviseError> {
-        let Some(process) = self.run.roles().named(name) else {
+        let Some(process) = self.run.plan.named(name) else {
             let newest = self.poses.newest_seq();
             match &mut self.recorder {
                 Some(recorder) if recorder.name() == name => {
@@ -92,7 +94,7 @@ impl Supervisor<'_> {
             }
             return Ok(());
         };
-        let stages = self.run.roles().restarted_with(process);
+        let stages = self.run.plan.restarted_with(process);
         let why_not = self.processes.why_not_again(stages.iter().copied());
         client.answer(&match why_not {
             Some(reason) => Answer::Refused(reason),
@@ -111,7 +113,7 @@ impl Supervisor<'_> {
 
     /// The client has its answer when the new program has worked on a first pose.
     fn begin_swap(&mut self, swap: &Swap, client: Client) -> Result<(), SuperviseError> {
-        let Some(process) = self.run.roles().named(&swap.process) else {
+        let Some(process) = self.run.plan.named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
             return Ok(());
         };
@@ -133,7 +135,7 @@ impl Supervisor<'_> {
         plan: StagePlan,
         client: Client,
     ) -> Result<(), SuperviseError> {
-        let stages = self.run.roles().restarted_with(process);
+        let stages = self.run.plan.restarted_with(process);
         if let Some(reason) = self.why_others_stay(process, &stages) {
             client.answer(&Answer::Refused(reason));
             return Ok(());
@@ -172,19 +174,26 @@ impl Supervisor<'_> {
     }
 
     pub(crate) fn give_up(&self, standby: Standby, reason: &str) {
-        let pid = standby.give_up(reason);
+        let Standby { child, client, .. } = standby;
+        let (name, command) = (child.name(), child.plan.command.join(" "));
+        client.answer(&Answer::Refused(format!(
+            "{name} continues as before, since `{command}` cannot take over: {reason}"
+        )));
+        let pid = child.pid();
+        // Its end is waited for.
+        drop(child);
         self.run.guardian.forget(pid);
     }
 
     /// Ends the replaced program, and lets the new one continue.
     fn take_over(&mut self, standby: Standby) -> Result<(), SuperviseError> {
         let process = standby.process;
-        let stages = self.run.roles().restarted_with(process);
+        let stages = self.run.plan.restarted_with(process);
         if let Some(reason) = self.why_others_stay(process, &stages) {
             self.give_up(standby, &reason);
             return Ok(());
         }
-        let (child, client) = standby.into_parts(self.run.manifest());
+        let Standby { child, client, .. } = standby;
         self.processes[process].kill();
         self.processes[process].await_end()?;
         // If the one before has left no scan without a pose, the one after it numbers scans as it
@@ -210,8 +219,18 @@ impl Supervisor<'_> {
 
     fn status(&self) -> Status {
         let manifest = self.run.manifest();
-        let processes = (0..self.processes.len()).map(|i| status_of(i, &self.processes, &self.run));
-        let mut processes: Vec<ProcessStatus> = processes.collect();
+        let status = |(child, begun): (&Child, &StagePlan)| {
+            let restarts = self.processes.restarts.get(child.name());
+            let is_source = child.stage() == Some(StageId::RadarReplay);
+            ProcessStatus {
+                is_swapped: child.plan.command != begun.command,
+                restarts: restarts.copied().unwrap_or_default(),
+                received: is_source.then(|| received_of(manifest)).flatten(),
+                ..child.status(&self.run, Activity::Running)
+            }
+        };
+        let begun = &self.run.plan.stages;
+        let mut processes: Vec<_> = self.processes.iter().zip(begun).map(status).collect();
         let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
         let phase = match () {
             () if self.followers.are_awaited => Phase::Following,
@@ -219,11 +238,7 @@ impl Supervisor<'_> {
             () => Phase::Running,
         };
         // Nothing waits for it.
-        processes.extend(
-            self.recorder
-                .iter()
-                .map(|recorder| recorder.status(manifest)),
-        );
+        processes.extend(self.recorder.iter().map(|it| it.status(&self.run)));
         Status {
             pid: process::id(),
             out: manifest.out.clone(),

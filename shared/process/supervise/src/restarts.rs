@@ -6,9 +6,8 @@ use gyre_stage::clock;
 
 use crate::{
     Event, Stall, SuperviseError,
-    child::{Child, RESTART_BACKOFF},
+    child::{Child, Death, RESTART_BACKOFF},
     clean,
-    death::Death,
     followers::Patience,
     recovery::restarted_after,
     supervisor::Supervisor,
@@ -23,7 +22,7 @@ impl Supervisor<'_> {
         let newest = self.poses.newest_seq();
         let died_without_progress = |i: usize| self.processes[i].died_without_progress(newest);
         let stages = [dead, &blamed].concat();
-        let restarted = restarted_after(&stages, self.run.roles(), died_without_progress);
+        let restarted = restarted_after(&stages, self.run.plan, died_without_progress);
         self.restart(&restarted, died_ns)
     }
 
@@ -31,7 +30,7 @@ impl Supervisor<'_> {
     /// these processes.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
         let is_blamed = |i: &usize| self.processes[*i].is_on_trial && !dead.contains(i);
-        let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
+        let mut blamed: Vec<usize> = self.run.plan.in_stream().filter(is_blamed).collect();
         blamed.retain(|i| self.go_back(*i, failure));
         blamed
     }
@@ -46,7 +45,7 @@ impl Supervisor<'_> {
             let (name, output) = (child.name(), death.output());
             self.run
                 .note(&format!("{name} died by {}{output}", death.cause));
-            if !death.killed {
+            if death.code.is_some() {
                 backoff = backoff.max(RESTART_BACKOFF);
                 if !child.is_on_trial {
                     failure = Some(format!("{name} died after it: {death}"));
@@ -74,15 +73,16 @@ impl Supervisor<'_> {
     fn go_back(&mut self, process: usize, reason: &str) -> bool {
         let begun = &self.run.plan.stages[process];
         let child = &mut self.processes[process];
-        let poses = self.poses.count();
-        let has_gone_back = self.swaps.go_back(process, child, begun, reason, poses);
-        if has_gone_back {
-            let stage = &begun.name;
-            self.run.note(&format!(
-                "{stage} goes back to the program before: {reason}"
-            ));
+        let failed = child.plan.command.join(" ");
+        if !child.go_back(begun) {
+            return false;
         }
-        has_gone_back
+        let name = child.name();
+        self.swaps.fail_trial(process, name, &failed, reason);
+        self.swaps.has_swapped(&child.plan, self.poses.count());
+        let sentence = format!("{name} goes back to the program before: {reason}");
+        self.run.note(&sentence);
+        true
     }
 
     pub(crate) fn restart(
@@ -137,8 +137,8 @@ impl Supervisor<'_> {
     fn respawn(&mut self, process: usize) -> Result<(), SuperviseError> {
         let newest = self.poses.newest_seq();
         loop {
-            let (manifest, starter) = (self.run.manifest(), self.run.starter());
-            match self.processes[process].respawn(manifest, &starter, newest) {
+            let starter = self.run.starter();
+            match self.processes[process].respawn(&starter, newest) {
                 Err(SuperviseError::Process(reason)) => {
                     if !self.go_back(process, &reason) {
                         return Err(SuperviseError::Process(reason));
@@ -209,7 +209,7 @@ impl Supervisor<'_> {
     /// A follower that has stayed for too long is started again as after a death.
     pub(crate) fn end_stuck_follower(&mut self, follower: usize) -> Result<(), SuperviseError> {
         let child = &mut self.processes[follower];
-        let progress = self.followers.progress_of(follower);
+        let (progress, _) = self.followers.progress_of(follower);
         self.run.say(Event::Following {
             follower: child.name(),
             progress,

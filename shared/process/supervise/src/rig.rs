@@ -14,7 +14,7 @@ use gyre_stage::{
     Manifest, StageError,
     message::AnyMessage,
     reader::Port,
-    run::{self, RunRoot},
+    run::RunRoot,
     services::Services,
     transport::{self, Node, Transport},
     wake::Signals,
@@ -61,8 +61,7 @@ impl<'a> Rig<'a> {
         signals: &'a Signals,
     ) -> Result<Self, SuperviseError> {
         transport::silence();
-        let unusable = |e: run::RootError| StageError::Input(e.to_string());
-        let root = RunRoot::acquire(&manifest.out, signals).map_err(unusable)?;
+        let root = RunRoot::acquire(&manifest.out, signals)?;
         (manifest.prefix, manifest.root) = (root.prefix(), root.path().to_owned());
         manifest.write(configuration)?;
         let transport = manifest.transport()?;
@@ -99,13 +98,17 @@ impl<'a> Rig<'a> {
             scheduling: scheduling.clone(),
             ..StagePlan::new(name, command.to_vec())
         };
-        let starter = Starter::new(self.signals, &self.guardian);
+        let starter = Starter {
+            manifest: &self.manifest,
+            signals: self.signals,
+            guardian: &self.guardian,
+        };
         let position = match stands_by {
             true => Position::Taken,
             false => Position::Free,
         };
         Ok(Process {
-            child: Child::spawn(&plan, &self.manifest, &starter, position)?,
+            child: Child::spawn(&plan, &starter, position)?,
             death: None,
         })
     }

@@ -11,7 +11,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Event, Plan, SuperviseError, child::Child, guardian::Guardian, roles::Roles, start::Starter,
+    Event, Plan, SuperviseError, child::Child, guardian::Guardian, start::Starter,
     wake_limit::WakeLimit,
 };
 
@@ -61,12 +61,12 @@ impl<'a> Run<'a> {
         &self.plan.manifest
     }
 
-    pub fn roles(&self) -> Roles<'a> {
-        Roles::of(self.plan)
-    }
-
     pub fn starter(&self) -> Starter<'_> {
-        Starter::new(&self.signals, &self.guardian)
+        Starter {
+            manifest: self.manifest(),
+            signals: &self.signals,
+            guardian: &self.guardian,
+        }
     }
 
     pub fn say(&mut self, event: Event<'_>) {

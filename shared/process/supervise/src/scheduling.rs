@@ -8,17 +8,6 @@ use rustix::{
     thread::{CpuSet, sched_setaffinity},
 };
 
-/// Returns the settings that a new process can apply to itself between fork and exec.
-pub(super) fn prepare(scheduling: &Scheduling) -> Prepared {
-    let mut set = CpuSet::new();
-    scheduling.cpus.iter().for_each(|cpu| set.set(*cpu));
-    Prepared {
-        cpus: (!scheduling.cpus.is_empty()).then_some(set),
-        nice: scheduling.nice,
-        realtime_priority: scheduling.realtime_priority,
-    }
-}
-
 /// The keys that the system can refuse, with their values, for a sentence.
 pub(super) fn keys(scheduling: &Scheduling) -> [String; 3] {
     let nice = scheduling.nice.unwrap_or_default();
@@ -30,29 +19,22 @@ pub(super) fn keys(scheduling: &Scheduling) -> [String; 3] {
     ]
 }
 
-/// A [`Scheduling`] without anything that has to be allocated.
-#[derive(Clone, Copy)]
-pub(crate) struct Prepared {
-    cpus: Option<CpuSet>,
-    nice: Option<i32>,
-    realtime_priority: Option<u8>,
-}
-
-impl Prepared {
-    /// Applies it to this process, and so to all that it will start. It only calls the system.
-    /// The error has the place of the refused key among [`keys`].
-    pub fn apply(&self) -> Result<(), (u8, io::Error)> {
-        if let Some(set) = &self.cpus {
-            sched_setaffinity(None, set).map_err(|error| (0_u8, error.into()))?;
-        }
-        if let Some(nice) = self.nice {
-            setpriority_process(None, nice).map_err(|error| (1_u8, error.into()))?;
-        }
-        if let Some(priority) = self.realtime_priority {
-            set_realtime(priority).map_err(|error| (2_u8, error))?;
-        }
-        Ok(())
+/// Applies it to this process between fork and exec, and so to all that it will start. It only
+/// calls the system, and allocates nothing. The error has the place of the refused key among
+/// [`keys`].
+pub(super) fn apply(scheduling: &Scheduling) -> Result<(), (u8, io::Error)> {
+    if !scheduling.cpus.is_empty() {
+        let mut set = CpuSet::new();
+        scheduling.cpus.iter().for_each(|cpu| set.set(*cpu));
+        sched_setaffinity(None, &set).map_err(|error| (0_u8, error.into()))?;
     }
+    if let Some(nice) = scheduling.nice {
+        setpriority_process(None, nice).map_err(|error| (1_u8, error.into()))?;
+    }
+    if let Some(priority) = scheduling.realtime_priority {
+        set_realtime(priority).map_err(|error| (2_u8, error))?;
+    }
+    Ok(())
 }
 
 fn set_realtime(priority: u8) -> io::Result<()> {

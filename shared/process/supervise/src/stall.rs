@@ -7,12 +7,11 @@ use std::time::{Duration, Instant};
 
 use gyre_messages::Item;
 use gyre_stage::{
-    Manifest, remote_progress,
     schedule::{self, Schedule},
     wake,
 };
 
-use crate::{Plan, Stall, roles::Roles};
+use crate::{Plan, Stall};
 
 /// Time between two looks at the heartbeats.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -20,10 +19,7 @@ const PERIOD: Duration = Duration::from_secs(1);
 const RESUMED: Duration = wake::MAX_WAIT.saturating_mul(5);
 
 pub(crate) struct Stalls<'a> {
-    roles: Roles<'a>,
-    manifest: &'a Manifest,
-    limit: Option<Duration>,
-    start_limit: Option<Duration>,
+    plan: &'a Plan,
     looks: Looks,
     /// Scans up to the scan of the newest pose, by `Item::published`.
     poses: u64,
@@ -42,10 +38,7 @@ pub(crate) struct Found {
 impl<'a> Stalls<'a> {
     pub fn of(plan: &'a Plan) -> Self {
         Self {
-            roles: Roles::of(plan),
-            manifest: &plan.manifest,
-            limit: plan.stall_timeout,
-            start_limit: plan.start_timeout,
+            plan,
             looks: Looks::new(),
             poses: 0,
             owed: None,
@@ -78,9 +71,9 @@ impl<'a> Stalls<'a> {
         }
         let mut followers = Vec::new();
         if self.looks.are_at_heartbeats(now)
-            && let Some(limit) = self.limit
+            && let Some(limit) = self.plan.stall_timeout
         {
-            let hanging = self.roles.followers().filter(|i| hangs(*i, limit));
+            let hanging = self.plan.followers().filter(|i| hangs(*i, limit));
             followers.extend(hanging.map(|i| (i, self.hang_of(i, limit))));
             let stall = self.hang(&hangs, limit, limit);
             if stall.is_some() {
@@ -106,7 +99,7 @@ impl<'a> Stalls<'a> {
 
     fn late_start(&mut self, stage: &str, since: Instant) -> Option<Stall> {
         self.owed = None;
-        let limit = self.start_limit?;
+        let limit = self.plan.start_timeout?;
         (since.elapsed() > limit).then(|| Stall::Start {
             stage: stage.to_owned(),
             limit,
@@ -114,10 +107,10 @@ impl<'a> Stalls<'a> {
     }
 
     fn late_message(&mut self) -> Option<Stall> {
-        let limit = self.limit?;
-        let owed = match remote_progress::owes(self.manifest, self.poses) {
+        let limit = self.plan.stall_timeout?;
+        let owed = match schedule::owes(&self.plan.manifest, self.poses) {
             true => None,
-            false => self.owed_by(schedule::read(self.manifest), limit),
+            false => self.owed_by(schedule::read(&self.plan.manifest), limit),
         };
         self.owe(owed);
         let (stall, since) = self.owed.as_ref()?;
@@ -151,13 +144,13 @@ impl<'a> Stalls<'a> {
         since: Duration,
         limit: Duration,
     ) -> Option<Stall> {
-        let process = self.roles.stages().find(|i| hangs(*i, since))?;
+        let process = self.plan.in_stream().find(|i| hangs(*i, since))?;
         Some(self.hang_of(process, limit))
     }
 
     fn hang_of(&self, process: usize, limit: Duration) -> Stall {
         Stall::Hang {
-            process: self.roles.name(process).to_owned(),
+            process: self.plan.name(process).to_owned(),
             limit,
         }
     }
@@ -166,15 +159,15 @@ impl<'a> Stalls<'a> {
     /// source if it is late, and all but a live source otherwise. When that does not help, all
     /// stages; `None` when that does not help either.
     pub fn remedy(&mut self, stall: &Stall) -> Option<Vec<usize>> {
-        let roles = self.roles;
+        let plan = self.plan;
         self.stalls_in_a_row += 1;
         Some(match (self.stalls_in_a_row, stall) {
-            (1, Stall::Hang { process, .. }) => roles
+            (1, Stall::Hang { process, .. }) => plan
                 .named(process)
-                .map_or_else(Vec::new, |process| roles.restarted_with(process)),
-            (1, Stall::Scan { .. }) => roles.sources(),
-            (1, _) => roles.all_but_survivors(&[]),
-            (2, _) => roles.stages().collect(),
+                .map_or_else(Vec::new, |process| plan.restarted_with(process)),
+            (1, Stall::Scan { .. }) => plan.sources(),
+            (1, _) => plan.all_but_survivors(&[]),
+            (2, _) => plan.in_stream().collect(),
             _ => return None,
         })
     }

@@ -30,19 +30,15 @@ pub(crate) enum Position {
 }
 
 pub(crate) struct Starter<'a> {
-    signals: &'a Signals,
-    guardian: &'a Guardian,
+    pub manifest: &'a Manifest,
+    pub signals: &'a Signals,
+    pub guardian: &'a Guardian,
 }
 
-impl<'a> Starter<'a> {
-    pub fn new(signals: &'a Signals, guardian: &'a Guardian) -> Self {
-        Self { signals, guardian }
-    }
-
+impl Starter<'_> {
     pub fn start(
         &self,
         plan: &StagePlan,
-        manifest: &Manifest,
         log: &PipeWriter,
         position: Position,
     ) -> Result<Child, SuperviseError> {
@@ -53,9 +49,7 @@ impl<'a> Starter<'a> {
             ))
         };
         let (mut refused, refusals) = io::pipe().map_err(failed)?;
-        let mut command = self
-            .command(plan, manifest, log, refusals)
-            .map_err(failed)?;
+        let mut command = self.command(plan, log, refusals).map_err(failed)?;
         if let Some(directory) = &plan.directory {
             command.current_dir(directory);
         }
@@ -83,7 +77,6 @@ impl<'a> Starter<'a> {
     fn command(
         &self,
         plan: &StagePlan,
-        manifest: &Manifest,
         log: &PipeWriter,
         refusals: PipeWriter,
     ) -> io::Result<Command> {
@@ -94,7 +87,7 @@ impl<'a> Starter<'a> {
         let mut command = Command::new(program);
         command
             .args(arguments)
-            .env(run::ENVIRONMENT, &manifest.root)
+            .env(run::ENVIRONMENT, &self.manifest.root)
             .stdin(Stdio::null())
             .stdout(log.try_clone()?)
             .stderr(log.try_clone()?)
@@ -102,11 +95,11 @@ impl<'a> Starter<'a> {
             // supervisor, which then stops each stage.
             .process_group(0);
         let (supervisor, guardian) = (getpid(), self.guardian.pipe());
-        let scheduling = scheduling::prepare(&plan.scheduling);
+        let scheduling = plan.scheduling.clone();
         let prepare = move || {
             set_parent_process_death_signal(Some(Signal::KILL))?;
             guardian.into_iter().for_each(guardian::join);
-            if let Err((key, error)) = scheduling.apply() {
+            if let Err((key, error)) = scheduling::apply(&scheduling) {
                 let _ = rustix::io::write(&refusals, &[key]);
                 return Err(error);
             }

@@ -1,8 +1,12 @@
 //! The loop of the supervisor. Its parts look at events and decide; `restarts` and `requests` carry
 //! out their decisions.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
 
+use gyre_messages::flag;
 use gyre_stage::{
     StageCounters, counters, sink, transport,
     wake::{self, Signals},
@@ -13,10 +17,10 @@ use gyre_run::Report;
 use crate::{
     Ending, Event, Plan, SuperviseError,
     child::Child,
+    clean,
     followers::Followers,
-    log::Logs,
-    observers::Sweep,
-    poses::{News, Poses},
+    log,
+    poses::Poses,
     processes::Processes,
     recorder::Recorder,
     recovery::Recovery,
@@ -25,6 +29,9 @@ use crate::{
     stall::Stalls,
     swaps::{ENDED, Swaps},
 };
+
+/// Time between two looks at the lengths of the logs.
+const PERIOD: Duration = Duration::from_secs(1);
 
 /// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not
 /// help.
@@ -53,8 +60,9 @@ pub(crate) struct Supervisor<'a> {
     pub followers: Followers<'a>,
     pub swaps: Swaps,
     pub socket: ControlSocket,
-    observers: Sweep,
-    logs: Logs,
+    /// When killed observers and the lengths of the logs are looked for again.
+    sweep_due: Instant,
+    logs_due: Instant,
     /// True when all stages have opened their topics once.
     is_ready: bool,
     /// True when a notice about the run was reported.
@@ -79,8 +87,8 @@ impl<'a> Supervisor<'a> {
             followers: Followers::of(plan),
             swaps: Swaps::default(),
             socket: ControlSocket::open(&plan.manifest.root)?,
-            observers: Sweep::new(),
-            logs: Logs::of(plan),
+            sweep_due: Instant::now() + PERIOD,
+            logs_due: Instant::now(),
             is_ready: false,
             has_notice: false,
             run,
@@ -102,15 +110,17 @@ impl<'a> Supervisor<'a> {
             }
             self.swaps.continue_trial(&self.processes, &self.run);
             self.continue_swap()?;
-            if !self.is_ready && self.processes.are_ready(&self.run) {
+            if !self.is_ready && self.processes.starting(&self.run).is_none() {
                 self.is_ready = true;
                 self.run.say(Event::Ready);
             }
             self.run.say(Event::Watched);
             self.keep_house()?;
-            let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
-            self.observers.run_if_due(&self.run, own);
-            let (followers, stages) = self.processes.ended(self.run.roles());
+            if Instant::now() >= self.sweep_due {
+                let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
+                self.sweep_due = clean::sweep_observers(&self.run, own);
+            }
+            let (followers, stages) = self.processes.ended(self.run.plan);
             self.recover_followers(&followers)?;
             match stages.is_empty() {
                 true => self.look_for_stalls()?,
@@ -157,11 +167,11 @@ impl<'a> Supervisor<'a> {
     }
 
     fn read_poses(&mut self) -> Result<bool, SuperviseError> {
-        while let Some(news) = self.poses.next()? {
-            let News::Pose(received) = news else {
-                return Ok(true);
-            };
+        while let Some(received) = self.poses.next()? {
             let pose = received.header();
+            if pose.item.is(flag::END) {
+                return Ok(true);
+            }
             self.stalls.progress(&pose.item);
             self.processes.pass_trials(pose, &self.recovery);
             self.recovery.see(pose);
@@ -172,7 +182,10 @@ impl<'a> Supervisor<'a> {
 
     /// Keeps the logs short, and the processes alive that nothing depends on.
     fn keep_house(&mut self) -> Result<(), SuperviseError> {
-        self.logs.bound_if_due();
+        if Instant::now() >= self.logs_due {
+            self.logs_due = Instant::now() + PERIOD;
+            log::bound_all(self.run.manifest());
+        }
         if !self.has_notice
             && let Some(sentence) = sink::notice(self.run.manifest())
         {
@@ -198,7 +211,7 @@ impl<'a> Supervisor<'a> {
             recorder.stop(&mut self.run, ending)?;
         }
         stopped?;
-        self.logs.bound();
+        log::bound_all(self.run.manifest());
         // The failure that the run ends by is the first one.
         match ending {
             Some(_) => self.processes.require_good_ends(&self.followers),

@@ -11,7 +11,6 @@ use std::{
 };
 
 use gyre_stage::{
-    Manifest,
     control::{Answer, PendingSwap, Swap},
     run,
 };
@@ -40,7 +39,7 @@ pub(crate) struct Standby {
     /// The index of the process whose place it is to take.
     pub process: usize,
     pub child: Child,
-    client: Client,
+    pub client: Client,
     since: Instant,
     ready: Option<Instant>,
 }
@@ -72,7 +71,7 @@ impl Swaps {
     ) -> Result<(), SuperviseError> {
         let manifest = run.manifest();
         let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
-        match Child::spawn(plan, manifest, &run.starter(), Position::Taken) {
+        match Child::spawn(plan, &run.starter(), Position::Taken) {
             Ok(child) => {
                 self.standby = Some(Standby {
                     process,
@@ -139,24 +138,6 @@ impl Swaps {
             after_poses,
         });
     }
-
-    /// False without a program to go back to.
-    pub fn go_back(
-        &mut self,
-        process: usize,
-        child: &mut Child,
-        begun: &StagePlan,
-        reason: &str,
-        after_poses: u64,
-    ) -> bool {
-        let failed = child.plan.command.join(" ");
-        let has_gone_back = child.go_back(begun);
-        if has_gone_back {
-            self.fail_trial(process, child.name(), &failed, reason);
-            self.has_swapped(&child.plan, after_poses);
-        }
-        has_gone_back
-    }
 }
 
 impl Standby {
@@ -167,23 +148,6 @@ impl Standby {
         }
         let has_gone = self.client.has_gone();
         has_gone.then(|| "who has asked for it has gone".to_owned())
-    }
-
-    /// Lets it take over: returns its process, and who waits for the result.
-    pub fn into_parts(self, manifest: &Manifest) -> (Child, Client) {
-        let _ = fs::remove_file(run::ready_file(&manifest.root, self.child.name()));
-        (self.child, self.client)
-    }
-
-    /// Returns the process that it was.
-    pub fn give_up(self, reason: &str) -> u32 {
-        let name = self.child.name();
-        let command = self.child.plan.command.join(" ");
-        let sentence =
-            format!("{name} continues as before, since `{command}` cannot take over: {reason}");
-        self.client.answer(&Answer::Refused(sentence));
-        // Its end is waited for.
-        self.child.pid()
     }
 }
 

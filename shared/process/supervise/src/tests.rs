@@ -20,31 +20,23 @@ pub(crate) const LIMIT: Duration = Duration::from_secs(5);
 
 pub(crate) fn manifest(out: &Path) -> Manifest {
     Manifest {
-        prefix: String::new(),
         root: out.to_owned(),
         out: out.to_owned(),
         window: Window {
             scans: 2,
             lag: 1,
             look_back: 1,
-            live_depth: 0,
             observers: 2,
-            slam: false,
-            localises: false,
-            objects: false,
+            ..Window::default()
         },
         limits: Limits {
             scan_bytes: 1000,
             raster_cells: 100,
             cell_m: 1.0,
             rasters: 1,
-            points: 0,
-            samples: 0,
+            ..Limits::default()
         },
-        live: false,
-        refines: false,
-        rate: None,
-        build: String::new(),
+        ..Manifest::default()
     }
 }
 

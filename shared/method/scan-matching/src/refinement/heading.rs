@@ -38,7 +38,7 @@ const SCALE: usize = 3;
 const SEEN: RowVector4<f64> = RowVector4::new(1.0, 0.0, 1.0, 0.0);
 
 /// The bias and the scale of the gyro, and the steady error of the radar.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Heading {
     pub bias_radps: f64,
     pub yaw_bias_rad: f64,

@@ -13,7 +13,7 @@ const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
 /// Least standard deviation of a scale around 1: the settings may be for other tyres.
 const TYRES: f64 = 0.02;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct WheelState {
     pub scale: f64,
     /// Error of the last pose along the path, against the map, m.

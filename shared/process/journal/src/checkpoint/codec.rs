@@ -6,7 +6,7 @@ use gyre_scan_matching::{
     Anchor, Heading, Keyframe, Standstill, TrackerState, Verdict, WheelState,
 };
 use gyre_storage::Checksum;
-use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, UnitComplex};
+use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
 
 /// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum
 /// of its motion, the number of keyframes; the tracker state.
@@ -122,14 +122,7 @@ impl<F: FnMut(&mut u64)> Words<F> {
     }
 
     fn heading(&mut self, heading: &mut Option<Heading>) {
-        let zero = Heading {
-            bias_radps: 0.0,
-            yaw_bias_rad: 0.0,
-            scale: 0.0,
-            covariance: Matrix4::zeros(),
-            verdict: Verdict::Agrees,
-        };
-        self.optional(heading, zero, |words, it| {
+        self.optional(heading, Heading::default(), |words, it| {
             words.reals([&mut it.bias_radps, &mut it.yaw_bias_rad, &mut it.scale]);
             words.reals(it.covariance.iter_mut());
             let mut verdict = it.verdict as u32;
@@ -143,18 +136,7 @@ impl<F: FnMut(&mut u64)> Words<F> {
     }
 
     fn wheels(&mut self, wheels: &mut Option<WheelState>) {
-        let zero = WheelState {
-            scale: 0.0,
-            offset_m: 0.0,
-            covariance: Matrix2::zeros(),
-            slips: false,
-            since_match_m: 0.0,
-            since_match_s: 0.0,
-            since_match_rad: 0.0,
-            since_place_s: 0.0,
-            unmatched: Matrix3::zeros(),
-        };
-        self.optional(wheels, zero, |words, it| {
+        self.optional(wheels, WheelState::default(), |words, it| {
             words.reals([&mut it.scale, &mut it.offset_m, &mut it.since_match_m]);
             words.reals([&mut it.since_match_s, &mut it.since_match_rad]);
             words.real(&mut it.since_place_s);

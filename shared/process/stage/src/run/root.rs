@@ -20,7 +20,6 @@ use rustix::{
     io::Errno,
     process::geteuid,
 };
-use thiserror::Error;
 
 use crate::{StageError, clock, shared_memory::SHARED_MEMORY, wake::Signals};
 
@@ -42,63 +41,31 @@ pub struct RunRoot {
     _lock: File,
 }
 
-#[derive(Debug, Error)]
-pub enum RootError {
-    #[error("{0}")]
-    Busy(String),
-    #[error(
-        "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
-    )]
-    Unusable { path: PathBuf, source: io::Error },
-    #[error("{0}")]
-    Unsafe(String),
-    #[error("interrupted before the start")]
-    Interrupted,
-    #[error(transparent)]
-    Signals(#[from] StageError),
-}
-
-impl RootError {
-    /// Returns whether another attempt may succeed: a run is being removed, or the last run of the
-    /// user has ended and removed the user's directory.
-    fn may_pass(&self) -> bool {
-        match self {
-            Self::Busy(_) => true,
-            Self::Unusable { source, .. } => source.kind() == io::ErrorKind::NotFound,
-            Self::Unsafe(_) | Self::Interrupted | Self::Signals(_) => false,
-        }
-    }
-}
-
 impl RunRoot {
     /// Creates and locks the root of the run that writes to `out`, after removing the files of the
     /// user's dead runs.
-    pub fn acquire(out: &Path, signals: &Signals) -> Result<Self, RootError> {
+    pub fn acquire(out: &Path, signals: &Signals) -> Result<Self, StageError> {
         let name = name(out);
         let deadline = Instant::now() + LIMIT;
         loop {
             match Self::try_acquire(out, &name) {
-                Err(failed) if failed.may_pass() && Instant::now() <= deadline => {}
+                Err(StageError::Transient(_)) if Instant::now() <= deadline => {}
                 acquired => return acquired,
             }
             if signals.sleep(PAUSE)? {
-                return Err(RootError::Interrupted);
+                return Err(StageError::Stopped);
             }
         }
     }
 
-    fn try_acquire(out: &Path, name: &str) -> Result<Self, RootError> {
+    fn try_acquire(out: &Path, name: &str) -> Result<Self, StageError> {
         let runs = user_directory()?;
         roots_in(&runs).for_each(|root| remove_if_dead(&root));
         let path = runs.join(name);
-        let unusable = |source| RootError::Unusable {
-            path: path.clone(),
-            source,
-        };
-        match try_lock(&lock_of(&path)).map_err(unusable)? {
+        match try_lock(&lock_of(&path)).map_err(unusable(&path))? {
             Attempt::Locked(lock) => {
                 remove_files(&path);
-                make_directory(&path).map_err(unusable)?;
+                make_directory(&path).map_err(unusable(&path))?;
                 Ok(Self {
                     // Of this start alone: a process that still has files of an earlier run open,
                     // as an observer may, must not remove files of this one.
@@ -109,7 +76,7 @@ impl RunRoot {
             }
             Attempt::Held(holder) => {
                 let holder = holder.map_or(String::new(), |holder| format!(", {holder}"));
-                Err(RootError::Busy(format!(
+                Err(StageError::Transient(format!(
                     "another run is writing to {}{holder}: wait for it, or choose another --out",
                     out.display()
                 )))
@@ -166,14 +133,26 @@ fn lock_of(root: &Path) -> PathBuf {
 /// Returns the directory of the user's runs, and creates it if it is missing. `/dev/shm` is open to
 /// all users, so an entry there is used only if it is a directory of this user that no other can
 /// write to.
-fn user_directory() -> Result<PathBuf, RootError> {
+fn user_directory() -> Result<PathBuf, StageError> {
     let path = user_path();
-    make_directory(&path).map_err(|source| RootError::Unusable {
-        path: path.clone(),
-        source,
-    })?;
+    make_directory(&path).map_err(unusable(&path))?;
     make_owner_only(&path)?;
     Ok(path)
+}
+
+/// The error of a directory for shared memory. Another attempt may help where the last run of the
+/// user has ended, and has removed the user's directory.
+fn unusable(path: &Path) -> impl Fn(io::Error) -> StageError {
+    move |error| {
+        let sentence = format!(
+            "cannot use {} for the run's shared memory: {error}; Gyre needs a writable tmpfs at /dev/shm",
+            path.display()
+        );
+        match error.kind() {
+            io::ErrorKind::NotFound => StageError::Transient(sentence),
+            _ => StageError::Input(sentence),
+        }
+    }
 }
 
 /// Opens a directory without following a link. It need not be readable.
@@ -192,16 +171,12 @@ fn set_owner_only(directory: &impl AsFd) -> io::Result<()> {
 /// Checks that a path is a directory of this user that no other could write to, and closes it to
 /// all others. A process with another umask may have created it, as the transport does in a process
 /// whose run has been removed.
-fn make_owner_only(path: &Path) -> Result<(), RootError> {
+fn make_owner_only(path: &Path) -> Result<(), StageError> {
     let unsafe_ = |state: &str, remedy: &str| {
         let path = path.display();
-        RootError::Unsafe(format!(
+        StageError::Input(format!(
             "{path} {state}, so the shared memory of a run would not be safe in it: {remedy}"
         ))
-    };
-    let unusable = |source| RootError::Unusable {
-        path: path.to_owned(),
-        source,
     };
     let directory = match open_directory(path) {
         Ok(directory) => directory,
@@ -211,13 +186,13 @@ fn make_owner_only(path: &Path) -> Result<(), RootError> {
                 "remove it, or ask its owner to",
             ));
         }
-        Err(error) => return Err(unusable(error.into())),
+        Err(error) => return Err(unusable(path)(error.into())),
     };
-    let status = rustix::fs::fstat(&directory).map_err(|error| unusable(error.into()))?;
+    let status = rustix::fs::fstat(&directory).map_err(|error| unusable(path)(error.into()))?;
     let (owner, mode) = (status.st_uid, status.st_mode & 0o7777);
     match (owner == geteuid().as_raw(), mode) {
         (true, OWNER_ONLY) => Ok(()),
-        (true, mode) if mode & NOT_OWN == 0 => set_owner_only(&directory).map_err(unusable),
+        (true, mode) if mode & NOT_OWN == 0 => set_owner_only(&directory).map_err(unusable(path)),
         (true, _) => Err(unsafe_(
             &format!("has mode {mode:04o} instead of 0700"),
             &format!("remove it, or `chmod 700 {}`", path.display()),

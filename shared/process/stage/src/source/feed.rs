@@ -5,8 +5,11 @@ use std::{mem, os::fd::BorrowedFd, time::Duration};
 use gyre_messages::{Hop, Item, Pose, Scan, StageId, flag};
 
 use crate::{
-    Launch, Listener, StageCounters, StageError, clock, reader::Port, schedule::ScheduleWriter,
-    wake, writer::Writer,
+    Launch, Listener, StageCounters, StageError, clock,
+    reader::{Port, Received},
+    schedule::ScheduleWriter,
+    wake,
+    writer::Writer,
 };
 
 /// Time without need for the supervisor to intervene: a source that waits for a sensor or for
@@ -133,7 +136,7 @@ impl<'a, M> Feed<'a, M> {
         let limit = limit.min(wake::MAX_WAIT);
         let woken = signals.wait_or_readable(&data, &handshakes, connections, limit)?;
         self.counters.wakes += 1;
-        self.may_have_new_readers = woken.may_have_new_readers();
+        self.may_have_new_readers = woken.may_have_new_readers;
         match woken.stop {
             true => Err(StageError::Stopped),
             false => Ok(()),
@@ -165,7 +168,7 @@ pub(crate) fn hop(started_ns: i64, finished_ns: i64) -> Hop {
 }
 
 /// The progress of the run, from its poses.
-pub(crate) struct Credit {
+pub struct Credit {
     pub poses: Port<Pose>,
     pub newest: Option<u64>,
     /// The same at the source.
@@ -187,17 +190,24 @@ impl Credit {
     }
 
     pub fn update(&mut self) -> Result<(), StageError> {
-        while let Some(pose) = self.poses.receive()? {
-            let item = pose.item();
-            self.has_ended |= item.is(flag::END);
-            if item.is(flag::SYNC) {
-                self.resume_at = Some(*item);
-            }
-            if !item.is(flag::BASE) && !item.is(flag::END) {
-                self.newest = self.newest.max(Some(item.seq));
-                self.published = self.published.max(Some(item.published));
-            }
-        }
+        while self.take()?.is_some() {}
         Ok(())
+    }
+
+    /// Takes the next pose into account and returns it; `None` if no pose has come.
+    pub fn take(&mut self) -> Result<Option<Received<Pose>>, StageError> {
+        let Some(pose) = self.poses.receive()? else {
+            return Ok(None);
+        };
+        let item = pose.item();
+        self.has_ended |= item.is(flag::END);
+        if item.is(flag::SYNC) {
+            self.resume_at = Some(*item);
+        }
+        if !item.is(flag::BASE) && !item.is(flag::END) {
+            self.newest = self.newest.max(Some(item.seq));
+            self.published = self.published.max(Some(item.published));
+        }
+        Ok(Some(pose))
     }
 }

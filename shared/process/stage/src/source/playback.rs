@@ -2,16 +2,15 @@
 
 use gyre_messages::Scan;
 use gyre_radar::continues;
+use gyre_run::SourceConfig;
 
-use super::{
-    Attempts, Feed, PAUSE, Source, Tolerance, Unreadable, hop, pace::Pace, position::Position,
-};
+use super::{Attempts, Feed, PAUSE, Source, Unreadable, hop, pace::Pace, position::Position};
 use crate::{StageError, clock, counters::Work, wake, writer::Draft};
 
 pub(super) struct Playback<'a, S: Source> {
     pub feed: Feed<'a, Scan>,
     pub source: &'a mut S,
-    pub tolerance: &'a Tolerance,
+    pub config: &'a SourceConfig,
 }
 
 impl<S: Source> Playback<'_, S> {
@@ -117,7 +116,7 @@ impl<S: Source> Playback<'_, S> {
             tracing::warn!(scan = position.index, "skipped: {reason}");
             position.index += 1;
             skipped += 1;
-            let most = self.tolerance.max_unreadable;
+            let most = self.config.max_unreadable;
             if skipped > most {
                 return Err(StageError::Input(format!(
                     "{skipped} scans in a row cannot be read, the last because {reason}; source.max_unreadable is {most}"
@@ -133,7 +132,7 @@ impl<S: Source> Playback<'_, S> {
         position: &Position,
         draft: &mut Draft<Scan>,
     ) -> Result<Option<String>, StageError> {
-        let mut attempts = Attempts::new(self.tolerance);
+        let mut attempts = Attempts::new(self.config);
         loop {
             let work = Work::begin();
             self.feed.schedule.due_at(work.started_ns)?;

@@ -64,41 +64,29 @@ impl Received {
         ]
     }
 
-    fn of(
-        [
-            missing,
-            left_out,
-            damaged,
-            foreign,
-            connections,
-            receives,
-            has_scan,
-            stamp_ns,
-            at_ns,
-        ]: [u64; 9],
-    ) -> Self {
+    fn of(numbers: [u64; 9]) -> Self {
+        let [missing_azimuths, scans_left_out, damaged_messages, ..] = numbers;
+        let [.., foreign_messages, connections, receives, has_scan, _, _] = numbers;
+        let [.., stamp_ns, at_ns] = numbers.map(|number| number as i64);
         Self {
-            missing_azimuths: missing,
-            scans_left_out: left_out,
-            damaged_messages: damaged,
-            foreign_messages: foreign,
+            missing_azimuths,
+            scans_left_out,
+            damaged_messages,
+            foreign_messages,
             connections,
             is_receiving: receives != 0,
-            last_scan: (has_scan != 0).then_some(LastScan {
-                stamp_ns: stamp_ns as i64,
-                at_ns: at_ns as i64,
-            }),
+            last_scan: (has_scan != 0).then_some(LastScan { stamp_ns, at_ns }),
         }
     }
 }
 
 /// Returns the deliveries of a run's sensor; `None` if its source is no sensor.
 pub fn read(manifest: &Manifest) -> Option<Received> {
-    numbers::read(&manifest.root.join(FILE), 0).map(Received::of)
+    numbers::read(&manifest.root.join(FILE)).map(Received::of)
 }
 
 pub(super) fn open(manifest: &Manifest) -> Result<Numbers<9>, StageError> {
-    Numbers::open(manifest, FILE, 0)
+    Numbers::open(manifest, FILE)
 }
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ pub struct Listener {
     port: listener::Listener<Ipc>,
 }
 
-pub(crate) struct Notifier {
+pub struct Notifier {
     event: String,
     port: notifier::Notifier<Ipc>,
 }
@@ -108,7 +108,7 @@ impl Notifier {
         })
     }
 
-    pub(crate) fn notify(&self) -> Result<(), StageError> {
+    pub fn notify(&self) -> Result<(), StageError> {
         let notified = self.port.notify().map(drop);
         notified.map_err(|e| StageError::transport(format!("notify {}", self.event), e))
     }

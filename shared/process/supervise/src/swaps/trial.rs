@@ -56,7 +56,7 @@ impl Swaps {
         }
     }
 
-    pub(super) fn fail_trial(&mut self, process: usize, name: &str, command: &str, reason: &str) {
+    pub fn fail_trial(&mut self, process: usize, name: &str, command: &str, reason: &str) {
         let is_of_it = |trial: &mut Trial| trial.process == process;
         if let Some(trial) = self.trial.take_if(is_of_it) {
             trial.client.answer(&Answer::Refused(format!(

@@ -7,7 +7,7 @@ use std::{
 
 use super::*;
 
-fn acquire(out: &Path) -> Result<RunRoot, RootError> {
+fn acquire(out: &Path) -> Result<RunRoot, StageError> {
     RunRoot::acquire(out, &Signals::install().unwrap())
 }
 

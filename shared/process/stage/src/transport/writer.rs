@@ -1,16 +1,21 @@
 //! The publisher of a topic.
 
-use std::{fs::File, marker::PhantomData, path::Path};
+use std::{fs::File, marker::PhantomData, path::Path, slice};
 
 use gyre_messages::{Item, Message, Pose, Sender, StageId, Topic, flag};
+use iceoryx2::{
+    port::{publisher::Publisher, update_connections::UpdateConnections},
+    prelude::BackpressureStrategy,
+    sample_mut::SampleMut,
+};
 use rustix::fs::{FallocateFlags, fallocate};
 
+use super::{AnyHeader, AnyPayload, Ipc, Listener, Node, Notifier, Service};
 use crate::{
     Launch, Manifest, StageError, clock,
     message::{AnyMessage, RecordedMessage},
     run::{self, SHARED_MEMORY},
     services,
-    transport::{Listener, Loan, Node, Notifier, Publisher, Service},
 };
 
 /// Publishes the messages of a topic and keeps a history for late readers: see
@@ -19,7 +24,9 @@ pub struct Writer<M> {
     pub(crate) topic: &'static str,
     handshake: Listener,
     data: Notifier,
-    publisher: Publisher,
+    header_bytes: usize,
+    elements: usize,
+    port: Publisher<Ipc, AnyPayload, AnyHeader>,
     message: PhantomData<M>,
 }
 
@@ -27,7 +34,8 @@ pub struct Writer<M> {
 pub type TopicWriter = Writer<AnyMessage>;
 
 pub struct Draft<M> {
-    loan: Loan,
+    sample: SampleMut<Ipc, AnyPayload, AnyHeader>,
+    header_bytes: usize,
     message: PhantomData<M>,
 }
 
@@ -54,23 +62,46 @@ impl<M> Writer<M> {
         let data = Notifier::open(node, &services::data_event(topic.name))?;
         // Last, since a publisher connects to all existing readers at once.
         let service = Service::open(node, topic)?;
-        let publisher = Publisher::create(&service, &manifest.window, &manifest.limits)?;
-        reserve(manifest, topic.name, publisher.id())?;
+        let sizes = (topic.sizes)(&manifest.window);
+        let elements = (topic.max_elements)(&manifest.limits);
+        let port = service
+            .factory
+            .publisher_builder()
+            .initial_max_slice_len(elements)
+            .max_loaned_samples(sizes.loaned)
+            // The transport would reserve a queue of samples of its own for each subscriber.
+            .override_sample_preallocation(move |_| sizes.samples())
+            // Never wait for a slow or dead reader: the window bounds the items in flight.
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|e| StageError::transport(format!("publish {}", topic.name), e))?;
+        // The id is the number in the name of its shared memory.
+        reserve(manifest, topic.name, port.id().value())?;
         Ok(Self {
             topic: topic.name,
             handshake,
             data,
-            publisher,
+            header_bytes: topic.header.bytes,
+            elements,
+            port,
             message: PhantomData,
         })
     }
 
-    /// Loans a message to fill in. The header is zero; the payload is uninitialised.
+    /// Loans a message of the longest payload to fill in. The header is zero; the payload is
+    /// whatever is in memory.
     pub fn loan(&self) -> Result<Draft<M>, StageError> {
-        Ok(Draft {
-            loan: self.publisher.loan()?,
+        // SAFETY: the topic's payload is a slice, so that any number of elements may be loaned.
+        let sample = unsafe { self.port.loan_custom_payload(self.elements) }
+            .map_err(|e| StageError::transport(format!("get memory for {}", self.topic), e))?;
+        let mut draft = Draft {
+            // SAFETY: any bytes of mapped memory are valid values of bytes.
+            sample: unsafe { sample.assume_init() },
+            header_bytes: self.header_bytes,
             message: PhantomData,
-        })
+        };
+        draft.bytes().0.fill(0);
+        Ok(draft)
     }
 
     /// Publishes a message without copying: readers receive its offset in shared memory.
@@ -80,15 +111,16 @@ impl<M> Writer<M> {
 
     fn put(&self, mut draft: Draft<M>, hop: Option<StageId>) -> Result<(), StageError> {
         if let Some(hop) = hop {
-            draft.loan.item().hop_mut(hop).published_ns = clock::now_ns();
+            draft.item().hop_mut(hop).published_ns = clock::now_ns();
         }
-        self.publisher.send(draft.loan)?;
+        let sent = draft.sample.send();
+        sent.map_err(|e| StageError::transport(format!("send {}", self.topic), e))?;
         self.data.notify()
     }
 
     pub(crate) fn end(&self, item: Item, hop: Option<StageId>) -> Result<(), StageError> {
         let mut draft = self.loan()?;
-        *draft.loan.item() = item.flagged(flag::END);
+        *draft.item() = item.flagged(flag::END);
         self.put(draft, hop)
     }
 
@@ -100,7 +132,7 @@ impl<M> Writer<M> {
         let new_reader = self.handshake.take()? > 0;
         // Unconditionally: after a lost handshake the reader finds the history at the end of its
         // own wait.
-        self.publisher.connect()?;
+        self.connect()?;
         if new_reader {
             self.data.notify()
         } else {
@@ -112,10 +144,16 @@ impl<M> Writer<M> {
     pub fn answer_handshakes(&self) -> Result<bool, StageError> {
         let new_reader = self.handshake.take()? > 0;
         if new_reader {
-            self.publisher.connect()?;
+            self.connect()?;
             self.data.notify()?;
         }
         Ok(new_reader)
+    }
+
+    fn connect(&self) -> Result<(), StageError> {
+        self.port
+            .update_connections()
+            .map_err(|e| StageError::transport(format!("connect the readers of {}", self.topic), e))
     }
 
     /// Returns the listener that new readers notify.
@@ -146,9 +184,32 @@ fn reserve(manifest: &Manifest, topic: &str, publisher: u128) -> Result<(), Stag
     })
 }
 
+impl<M> Draft<M> {
+    /// Returns the bytes of the header and of the payload.
+    fn bytes(&mut self) -> (&mut [u8], &mut [u8]) {
+        let header = std::ptr::from_mut(self.sample.user_header_mut()).cast::<u8>();
+        let payload = self.sample.payload_mut();
+        let (elements, bytes) = (payload.as_mut_ptr().cast::<u8>(), payload.len());
+        // SAFETY: the topic was opened with this size of headers, so that the sample has as many
+        // bytes there. `loan` has written them. An element of `AnyPayload` is one byte. Header and
+        // payload are disjoint parts of a sample that this draft owns.
+        unsafe {
+            (
+                slice::from_raw_parts_mut(header, self.header_bytes),
+                slice::from_raw_parts_mut(elements, bytes),
+            )
+        }
+    }
+
+    /// Returns the item of the message's scan, which is at the start of every header.
+    fn item(&mut self) -> &mut Item {
+        bytemuck::from_bytes_mut(&mut self.bytes().0[..size_of::<Item>()])
+    }
+}
+
 impl<M: Message> Draft<M> {
     pub fn header(&mut self) -> &mut M::Header {
-        bytemuck::from_bytes_mut(self.loan.header())
+        bytemuck::from_bytes_mut(self.bytes().0)
     }
 
     /// Returns the values of the payload: bytes of a scan, cells of a raster.
@@ -157,7 +218,7 @@ impl<M: Message> Draft<M> {
     }
 
     pub fn parts<T: bytemuck::Pod>(&mut self) -> (&mut M::Header, &mut [T]) {
-        let (header, payload) = self.loan.parts();
+        let (header, payload) = self.bytes();
         (
             bytemuck::from_bytes_mut(header),
             bytemuck::cast_slice_mut(payload),
@@ -170,7 +231,7 @@ impl TopicWriter {
     /// for.
     pub fn send_unchanged(&self, start: &[u8], payload: &[u8]) -> Result<(), StageError> {
         let mut draft = self.loan()?;
-        let (header, room) = draft.loan.parts();
+        let (header, room) = draft.bytes();
         if start.len() != header.len() {
             return Err(StageError::Input(format!(
                 "a header of {} bytes does not belong to topic `{}`",
@@ -205,7 +266,7 @@ impl TopicWriter {
         item: Item,
     ) -> Result<(), StageError> {
         let mut draft = self.loan()?;
-        let (header, payload) = draft.loan.parts();
+        let (header, payload) = draft.bytes();
         let (bytes, room) = (message.payload.len(), payload.len());
         let is_whole = message.header.len() == header.len();
         let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
@@ -218,7 +279,7 @@ impl TopicWriter {
         // The memory behind it has no meaning, and must not differ from run to run.
         payload[bytes..].fill(0);
         header.copy_from_slice(&message.header);
-        *draft.loan.item() = item;
+        *draft.item() = item;
         self.send(draft, StageId::RadarReplay)
     }
 }

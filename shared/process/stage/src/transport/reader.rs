@@ -1,20 +1,62 @@
 //! The subscriber of a topic: the raw queue, or its items in order.
 
-use std::marker::PhantomData;
+use std::{marker::PhantomData, slice};
 
 use bytemuck::Pod;
 use gyre_messages::{Item, Limits, Message, Topic, flag};
-
-use crate::{
-    Launch, Manifest, StageError, clock,
-    message::RecordedMessage,
-    services,
-    transport::{Listener, Node, Notifier, Sample, Service, Subscriber},
+use iceoryx2::{
+    port::{ReceiveError, port_name::PortName, subscriber},
+    sample::Sample,
 };
+
+use super::{AnyHeader, AnyPayload, Ipc, Listener, Node, Notifier, Service};
+use crate::{Launch, Manifest, StageError, clock, message::RecordedMessage, services};
+
+type Bytes = Sample<Ipc, AnyPayload, AnyHeader>;
+
+pub(crate) struct Subscriber {
+    topic: &'static str,
+    is_observer: bool,
+    port: subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>,
+}
+
+impl Subscriber {
+    /// Subscribes as a process of the run, or as an observer, under a name for counting observers.
+    pub(crate) fn create(service: &Service, observer: Option<&str>) -> Result<Self, StageError> {
+        let topic = service.topic.name;
+        let mut builder = service.factory.subscriber_builder();
+        if let Some(name) = observer {
+            let name = PortName::new(name);
+            builder =
+                builder.name(&name.map_err(|e| StageError::transport("name the observer", e))?);
+        }
+        let port = builder.create();
+        let port = port.map_err(|e| StageError::transport(format!("subscribe to {topic}"), e))?;
+        Ok(Self {
+            topic,
+            is_observer: observer.is_some(),
+            port,
+        })
+    }
+
+    /// Receives the next message; `None` if the queue is empty, or cannot be read now.
+    fn receive(&self) -> Result<Option<Bytes>, StageError> {
+        match self.port.receive() {
+            Ok(sample) => Ok(sample),
+            // Samples of a dead publisher are still borrowed. The next call succeeds once they are
+            // released.
+            Err(ReceiveError::ExceedsMaxBorrows) if !self.is_observer => Ok(None),
+            // The publisher has just died or is being restarted. Its next message is found at the
+            // next wake-up.
+            Err(ReceiveError::ConnectionFailure(_)) if self.is_observer => Ok(None),
+            Err(e) => Err(StageError::transport(format!("receive {}", self.topic), e)),
+        }
+    }
+}
 
 /// A message in shared memory, borrowed from its publisher until it is dropped.
 pub struct Received<M> {
-    sample: Sample,
+    sample: Bytes,
     topic: &'static Topic,
     message: PhantomData<M>,
     /// Time of its removal from the queue, `CLOCK_MONOTONIC`, ns.
@@ -23,28 +65,37 @@ pub struct Received<M> {
 
 impl<M: Message> Received<M> {
     pub fn header(&self) -> &M::Header {
-        bytemuck::from_bytes(self.sample.header())
+        bytemuck::from_bytes(self.header_bytes())
     }
 }
 
 impl<M> Received<M> {
     pub fn header_bytes(&self) -> &[u8] {
-        self.sample.header()
+        let header = std::ptr::from_ref(self.sample.user_header()).cast::<u8>();
+        // SAFETY: the topic was opened with this size of headers, so that the sample has as many
+        // bytes there, which its publisher does not write any more.
+        unsafe { slice::from_raw_parts(header, self.topic.header.bytes) }
+    }
+
+    fn payload(&self) -> &[u8] {
+        let payload = self.sample.payload();
+        // SAFETY: an element of `AnyPayload` is one byte.
+        unsafe { slice::from_raw_parts(payload.as_ptr().cast::<u8>(), payload.len()) }
     }
 
     pub fn item(&self) -> &Item {
-        bytemuck::from_bytes(&self.sample.header()[..size_of::<Item>()])
+        bytemuck::from_bytes(&self.header_bytes()[..size_of::<Item>()])
     }
 
     /// Returns the values of the payload, in the publisher's memory.
     pub fn values<T: Pod>(&self) -> &[T] {
-        bytemuck::cast_slice(self.sample.payload())
+        bytemuck::cast_slice(self.payload())
     }
 
     /// Returns a copy of the message outside of shared memory: its header, and what that describes
     /// of its payload.
     pub fn to_bytes(&self) -> RecordedMessage {
-        let (header, payload) = (self.sample.header(), self.sample.payload());
+        let (header, payload) = (self.header_bytes(), self.payload());
         let content = (self.topic.content_bytes)(header).unwrap_or(payload.len());
         RecordedMessage {
             header: header.to_vec(),
@@ -126,10 +177,9 @@ impl<M> Port<M> {
             message: PhantomData,
             received_ns: clock::now_ns(),
         };
-        let sample = &received.sample;
-        match (self.topic.check)(sample.header(), sample.payload(), &self.limits) {
+        match (self.topic.check)(received.header_bytes(), received.payload(), &self.limits) {
             Ok(()) => Ok(Some(received)),
-            Err(violation) => Err(received.malformed(violation.to_string())),
+            Err(violation) => Err(received.malformed(violation)),
         }
     }
 
