@@ -1,5 +1,7 @@
 //! Places of the drive that are seen again.
 
+use std::convert::Infallible;
+
 use gyre_geometry::{OdometryMotion, Pose, UncertainMotion};
 use gyre_slam::{ClosingError, Keyframe, KeyframeBuilder, LoopCloser, SUBMAP_REACH_M, ScanPose};
 

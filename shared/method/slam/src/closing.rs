@@ -3,8 +3,6 @@
 
 mod cache;
 
-use std::convert::Infallible;
-
 use gyre_estimation::places::{
     Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
     neighbours,
