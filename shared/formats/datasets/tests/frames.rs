@@ -1,4 +1,4 @@
-//! Poses in space, with roll and pitch, in the frames that vehicles and cameras have.
+//! Poses in space, with roll and pitch.
 
 use std::{fmt::Write, fs};
 
@@ -6,7 +6,7 @@ use crate::common::assert_refused;
 use gyre_datasets::{TrajectoryError, read_trajectory};
 use gyre_geometry::{Pose, pose};
 use gyre_radar::Trajectory;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 const START_US: i64 = 1_630_597_331_000_000;
 /// A place in UTM, m.
@@ -40,12 +40,6 @@ fn planar(drive: &[Isometry3<f64>]) -> Vec<Pose> {
         pose(p.translation.x, p.translation.y, ahead.y.atan2(ahead.x))
     };
     drive.iter().map(plane).collect()
-}
-
-/// From a vehicle's axes to a camera's: x right, y down, z forward.
-fn camera_from_vehicle() -> UnitQuaternion<f64> {
-    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
 }
 
 fn kitti_line(pose: &Isometry3<f64>) -> String {
@@ -107,52 +101,22 @@ fn boreas_odometry_from_the_first_frame_is_mirrored() {
 }
 
 #[test]
-fn poses_of_a_camera_are_in_its_plane_of_motion() {
-    let from_vehicle = camera_from_vehicle();
+fn poses_in_space_are_projected_to_the_plane() {
     for bend in [0.0, 0.02, 0.9] {
         let drive = drive(bend);
-        let camera = |pose: &Isometry3<f64>| from_vehicle * pose * from_vehicle.inverse();
-        let camera: Vec<_> = drive.iter().map(camera).collect();
-        // As a camera in the world of a vehicle.
-        let mixed = drive.iter().map(|pose| pose * from_vehicle.inverse());
-        let mixed: Vec<_> = mixed.collect();
         let expected = planar(&drive);
-        for poses in [&drive, &camera, &mixed] {
-            assert_near(&read(&kitti(poses)).unwrap().poses, &expected, 1e-6);
-            assert_near(&read(&tum(poses)).unwrap().poses, &expected, 1e-6);
-        }
+        assert_near(&read(&kitti(&drive)).unwrap().poses, &expected, 1e-6);
+        assert_near(&read(&tum(&drive)).unwrap().poses, &expected, 1e-6);
     }
-}
-
-#[test]
-fn positions_of_a_camera_are_in_its_plane_of_motion() {
-    let drive = drive(0.3);
-    let only = |turn: UnitQuaternion<f64>| -> Vec<_> {
-        let positions = drive.iter().map(|pose| turn * pose.translation.vector);
-        positions
-            .map(|p| Isometry3::from_parts(p.into(), UnitQuaternion::identity()))
-            .collect()
-    };
-    let ahead = |p: &Isometry3<f64>| pose(p.translation.x, p.translation.y, 0.0);
-    let expected: Vec<_> = drive.iter().map(ahead).collect();
-    for turn in [UnitQuaternion::identity(), camera_from_vehicle()] {
-        let found = read(&kitti(&only(turn))).unwrap();
-        assert_near(&found.poses, &expected, 1e-6);
-    }
-}
-
-#[test]
-fn a_vehicle_that_stands_turns_in_the_plane_of_its_frame() {
     let turns = (0..40).map(|k| UnitQuaternion::from_euler_angles(0.0, 0.0, 0.1 * f64::from(k)));
-    let drive: Vec<_> = turns
+    let standing: Vec<_> = turns
         .map(|turn| Isometry3::from_parts(Translation3::identity(), turn))
         .collect();
-    let from_vehicle = camera_from_vehicle();
-    let camera = |pose: &Isometry3<f64>| from_vehicle * pose * from_vehicle.inverse();
-    let camera: Vec<_> = drive.iter().map(camera).collect();
-    for poses in [&drive, &camera] {
-        assert_near(&read(&kitti(poses)).unwrap().poses, &planar(&drive), 1e-9);
-    }
+    assert_near(
+        &read(&kitti(&standing)).unwrap().poses,
+        &planar(&standing),
+        1e-9,
+    );
 }
 
 #[test]

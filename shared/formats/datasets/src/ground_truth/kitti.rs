@@ -10,7 +10,7 @@ use nalgebra::{Complex, Matrix3, Translation2, Unit, UnitComplex, Vector3};
 
 use super::{
     LineError, check_increasing, lines, numbers,
-    plane::{Matrix, Plane},
+    plane::{Matrix, project},
 };
 use crate::dataset::stamp;
 use gyre_radar::trajectory::Trajectory;
@@ -37,7 +37,8 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         stamps.push(stamp);
         matrices.push(inverse(&matrix));
     }
-    let mut poses = projected(&matrices)?;
+    let projected = project(&matrices)?.into_iter();
+    let mut poses: Vec<Pose> = projected.map(planar).collect();
     // Boreas' sensors have y to the right where the world is their first frame, not a map.
     if stamped && matrices.first().is_some_and(is_near_identity) {
         poses.iter_mut().for_each(|pose| *pose = mirrored(pose));
@@ -46,12 +47,6 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         stamp_ns: stamps,
         poses,
     })
-}
-
-fn projected(matrices: &[Matrix]) -> Result<Vec<Pose>, LineError> {
-    let plane = Plane::of(matrices).map_err(|reason| LineError::new(1, reason))?;
-    let project = |matrix| planar(plane.project(matrix));
-    Ok(matrices.iter().map(project).collect())
 }
 
 fn inverse(m: &Matrix) -> Matrix {

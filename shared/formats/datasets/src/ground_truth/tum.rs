@@ -6,7 +6,7 @@ use gyre_geometry::{Pose, pose};
 
 use super::{
     LineError, check_increasing, lines, numbers,
-    plane::{Matrix, Plane},
+    plane::{Matrix, project},
 };
 use crate::dataset::stamp;
 use gyre_radar::trajectory::Trajectory;
@@ -29,16 +29,13 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         stamps.push(stamp);
         matrices.push(matrix([x, y, z], [qx, qy, qz, qw]));
     }
-    let plane = Plane::of(&matrices).map_err(|reason| LineError::new(1, reason))?;
     // Direction ahead in the plane: correct for any roll and pitch, and for quaternions that are
     // not exactly normalised.
-    let projected = matrices.iter().map(|matrix| {
-        let [x, y, cos, sin] = plane.project(matrix);
-        pose(x, y, sin.atan2(cos))
-    });
+    let projected = project(&matrices)?.into_iter();
+    let poses = projected.map(|[x, y, cos, sin]| pose(x, y, sin.atan2(cos)));
     Ok(Trajectory {
         stamp_ns: Some(stamps),
-        poses: projected.collect(),
+        poses: poses.collect(),
     })
 }
 
