@@ -15,7 +15,6 @@
 
 pub mod bags;
 mod disk;
-mod early_lines;
 mod error;
 pub mod file;
 mod generations;

@@ -1,7 +1,7 @@
 //! Writes a recording: a chunk at least twice a second, each with its table behind it.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, VecDeque},
     fs::{File, OpenOptions},
     mem,
     os::unix::fs::OpenOptionsExt,
@@ -18,7 +18,6 @@ use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader}
 use crate::{
     ENCODING, Entry, Head, LogLine, RecordingError,
     disk::{Disk, Synchronise},
-    early_lines::EarlyLines,
     exact_channel, generations,
     image::Rows,
     table::Table,
@@ -32,6 +31,9 @@ const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
 const LEVEL: u32 = 1;
+
+/// Log lines that wait for the first message: a radar may be switched on days after the recorder.
+const MAX_EARLY: usize = 4096;
 
 const PROTOBUF: &str = "protobuf";
 /// The channel of the run's health, and its schema: any JSON object.
@@ -68,8 +70,8 @@ pub struct RecordingWriter {
     /// The newest time of the sensor when this file had its first message, which may be of an
     /// earlier scan: topics lag behind `scan`.
     first_ns: Option<i64>,
-    /// Log lines that came before the first message.
-    early: EarlyLines,
+    /// The newest log lines that came before the first message.
+    early: VecDeque<LogLine>,
 }
 
 /// Returns the header of a message: the sensor's time, and when it was received.
@@ -120,7 +122,7 @@ impl RecordingWriter {
             pending: (0, None),
             newest_ns: None,
             first_ns: None,
-            early: EarlyLines::default(),
+            early: VecDeque::new(),
         };
         writer.begin(head).map_err(unwritable)?;
         // Its name survives a power failure too.
@@ -200,7 +202,10 @@ impl RecordingWriter {
     /// Adds a line of the log at the time of the newest scan.
     pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
         if self.newest_ns.is_none() {
-            self.early.push(line);
+            if self.early.len() == MAX_EARLY {
+                self.early.pop_front();
+            }
+            self.early.push_back(line);
             return Ok(());
         }
         self.checked(|writer| writer.write_log(&line))
@@ -212,7 +217,7 @@ impl RecordingWriter {
     }
 
     fn write_early(&mut self) -> Result<(), McapError> {
-        let mut lines = mem::take(&mut self.early).into_lines();
+        let mut lines = mem::take(&mut self.early).into_iter();
         lines.try_for_each(|line| self.write_log(&line))
     }
 

@@ -158,9 +158,9 @@ fn what_is_no_log_of_a_gyro_is_refused_with_the_reason() {
         "1,2,3,4,5,6,7\n|its 7 columns have no names",
         "1,2,3,4,5,6,7,8\n|first version of MulRan's xsens_imu.csv",
         "stamp_ns,gyro_x,gyro_y,gyro_z\n|it has no samples",
-        "stamp_ns;gyro_x;gyro_y;gyro_z\n1;0,1;0,2;0,3\n|the first in line 2: \"0,1\" has a decimal comma: write decimal points",
+        "stamp_ns;gyro_x;gyro_y;gyro_z\n1;0,1;0,2;0,3\n|the first in line 2: in \"1; 0,1; 0,2; 0,3\", write stamps as seconds or nanoseconds since 1970, numbers with decimal points",
         "stamp_ns,gyro_x,gyro_y,gyro_z\n1;0.1;0.2;0.3\n|it has 1 fields in place of 4: do all rows have the mark",
-        "time,gyro_x,gyro_y,gyro_z\n2025-10-14T15:41:25.551Z,0,0,0\n|\"2025-10-14T15:41:25.551Z\" is a date or a time of day: write stamps as",
+        "time,gyro_x,gyro_y,gyro_z\n2025-10-14T15:41:25.551Z,0,0,0\n|in \"2025-10-14T15:41:25.551Z; 0; 0; 0\", write stamps as seconds",
     ] {
         let (text, reason) = case.split_once('|').unwrap();
         assert_refused(read("imu.csv", text), reason);
