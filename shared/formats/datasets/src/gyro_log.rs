@@ -2,13 +2,11 @@
 
 mod columns;
 pub(crate) mod faults;
-mod jumps;
-mod track;
+pub(crate) mod jumps;
 
 use std::path::{Path, PathBuf};
 
 pub use faults::{LogFaults, LogGap};
-pub use track::SampleTrack;
 
 use gyre_samples::{Sample, SampleKind, UpAxis};
 

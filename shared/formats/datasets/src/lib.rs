@@ -30,7 +30,7 @@ pub use gnss_log::{GnssFaults, GnssLog, LoggedFix, ReceivedFixes};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
-pub use gyro_log::{GyroLog, LogFaults, LogGap, SampleTrack};
+pub use gyro_log::{GyroLog, LogFaults, LogGap};
 pub use inspect::{InspectedLogs, Report, inspect, inspect_dataset};
 pub use logs::LogError;
 pub use plain_words::{clipped, in_plain_words};
