@@ -5,7 +5,6 @@ mod detect;
 mod eccentricity;
 mod encoder;
 mod error;
-mod file_list;
 mod first_image;
 mod foreign;
 mod format;
@@ -27,7 +26,10 @@ mod stale;
 pub(crate) mod stamp;
 mod transposed;
 
-use std::{ops::Range, path::Path};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
@@ -37,7 +39,6 @@ pub use detect::is_dataset;
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 pub use error::{OpenError, ReadError};
-pub use file_list::FileList;
 pub use foreign::foreign;
 pub use format::Format;
 pub use image_size::ImageSize;
@@ -142,11 +143,12 @@ pub trait Dataset: Send {
     }
 
     /// The files of the scans.
-    fn files(&self) -> &FileList;
+    fn files(&self) -> &[PathBuf];
 
     /// The file of a scan; an empty path past the end.
     fn file(&self, index: usize) -> &Path {
-        self.files().get(index).unwrap_or(Path::new(""))
+        let file = self.files().get(index);
+        file.map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it
@@ -228,7 +230,7 @@ pub fn reopen(
     root: &Path,
     options: &DatasetOptions,
     format: Format,
-    files: FileList,
+    files: Vec<PathBuf>,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_found(detect::Found::listed(root, format, files)?, options)

@@ -18,11 +18,10 @@ mod table;
 mod wheel_log;
 
 pub use dataset::{
-    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, FileList,
-    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError,
-    check_capacity, correct_eccentricity, encoder_counts, foreign, frame_stamps, is_dataset,
-    middle_ns, open, open_resolved, open_source, parse_seconds, reopen, stamp_to_ns,
-    stored_options, turn_ns,
+    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, Format,
+    ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError, check_capacity,
+    correct_eccentricity, encoder_counts, foreign, frame_stamps, is_dataset, middle_ns, open,
+    open_resolved, open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use first_scan::check_first_scan;

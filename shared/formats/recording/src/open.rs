@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_datasets::{Dataset, DatasetOptions, FileList, Format, OpenError, foreign};
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, foreign};
 
 use crate::{
     Recording, RecordingError,
@@ -45,16 +45,13 @@ pub fn reopen(
     root: &Path,
     options: &DatasetOptions,
     format: Format,
-    files: FileList,
+    files: Vec<PathBuf>,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     match format {
-        Format::Mcap => {}
-        Format::Ros2Bag => return bags::reopen(root, options, &files),
-        _ => return gyre_datasets::reopen(root, options, format, files),
+        Format::Mcap => open_parts(&files, root, options),
+        Format::Ros2Bag => bags::reopen(root, options, files),
+        _ => gyre_datasets::reopen(root, options, format, files),
     }
-    let paths = (0..files.len()).filter_map(|index| files.get(index));
-    let paths: Vec<PathBuf> = paths.map(Path::to_owned).collect();
-    open_parts(&paths, root, options)
 }
 
 /// As [`gyre_datasets::stored_options`]: for a recording, the options of its run.

@@ -1,11 +1,14 @@
 //! The scans of a recording as a dataset: bytes, azimuths, times and constants as they were
 //! recorded.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use gyre_datasets::{
-    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, OpenError, Properties,
-    ReadError, check_capacity, turn_ns,
+    DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError, Properties, ReadError,
+    check_capacity, turn_ns,
 };
 use gyre_messages::{Message, Scan, ScanHeader};
 use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
@@ -20,7 +23,7 @@ const MAX_SCANS: u64 = 50_000_000;
 pub(crate) struct Scans {
     recording: Recording,
     properties: Properties,
-    files: FileList,
+    files: Vec<PathBuf>,
     entries: BTreeMap<usize, Entry>,
     first: SweepGeometry,
     /// Of the scan that was read last.
@@ -163,7 +166,7 @@ impl Dataset for Scans {
         self.entries.keys().next().copied().unwrap_or_default()
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.files
     }
 

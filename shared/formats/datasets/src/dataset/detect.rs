@@ -5,7 +5,6 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
-use super::file_list::FileList;
 use super::first_image::FirstImage;
 use super::foreign::{foreign, foreign_in};
 use super::format::Format;
@@ -36,8 +35,12 @@ impl Found {
         }
     }
 
-    pub(crate) fn listed(root: &Path, format: Format, files: FileList) -> Result<Self, OpenError> {
-        let folder = files.get(0).and_then(Path::parent).unwrap_or(root);
+    pub(crate) fn listed(
+        root: &Path,
+        format: Format,
+        files: Vec<PathBuf>,
+    ) -> Result<Self, OpenError> {
+        let folder = files.first().and_then(|file| file.parent()).unwrap_or(root);
         let folder = folder.to_owned();
         let images = Images::listed(&folder, files)?;
         Ok(Self::new(format, folder, images))

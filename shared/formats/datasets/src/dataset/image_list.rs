@@ -5,17 +5,16 @@ use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fs::{self, DirEntry};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
-use super::file_list::FileList;
 use super::stamp;
 
 const MAX_NAMED: usize = 4;
 
 #[derive(Debug, Default)]
 pub(crate) struct ImageList {
-    pub(crate) files: FileList,
+    pub(crate) files: Vec<PathBuf>,
     pub(crate) note: Option<String>,
 }
 

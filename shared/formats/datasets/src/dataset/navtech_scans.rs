@@ -5,7 +5,6 @@ use super::detect::Found;
 use super::eccentricity::correct_eccentricity;
 use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 use super::error::{OpenError, ReadError};
-use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_size::ImageSize;
@@ -20,6 +19,7 @@ use super::{Dataset, Properties, check_capacity};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 /// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of
 /// metadata.
@@ -200,7 +200,7 @@ impl Dataset for NavtechScans {
         &self.properties
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.images.files
     }
 

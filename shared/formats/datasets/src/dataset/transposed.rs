@@ -4,7 +4,6 @@
 use super::detect::Found;
 use super::eccentricity::correct_eccentricity;
 use super::error::{OpenError, ReadError};
-use super::file_list::FileList;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::options::{DatasetOptions, LostAzimuthOption};
@@ -12,6 +11,7 @@ use super::profiles::Profile;
 use super::stale::StaleRows;
 use super::{Dataset, Properties, check_capacity};
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
+use std::path::PathBuf;
 
 /// Side of the blocks of the transposition, pixels: a cache line.
 const BLOCK: usize = 64;
@@ -124,7 +124,7 @@ impl Dataset for TransposedScans {
         &self.properties
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.images.files
     }
 

@@ -58,7 +58,7 @@ fn a_dataset_that_is_opened_again_has_the_scans_that_it_had() {
         let root = folder();
         let files = write(root.path(), 4);
         let dataset = opened(root.path());
-        let (format, listed) = (dataset.format(), dataset.files().clone());
+        let (format, listed) = (dataset.format(), dataset.files().to_vec());
         let none = DatasetOptions::default();
         fs::rename(&files[1], files[1].with_file_name("000000.png")).unwrap();
         let mut again = reopen(root.path(), &none, format, listed).unwrap();

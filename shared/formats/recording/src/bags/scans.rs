@@ -10,8 +10,8 @@ use std::{
 
 use gyre_colossus::{Azimuth, SweepAssembler};
 use gyre_datasets::{
-    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
-    OpenError, Properties, ReadError, check_capacity, turn_ns,
+    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError,
+    Properties, ReadError, check_capacity, turn_ns,
 };
 use gyre_radar::{ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
@@ -35,12 +35,11 @@ pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, O
 pub fn reopen(
     path: &Path,
     options: &DatasetOptions,
-    files: &FileList,
+    files: Vec<PathBuf>,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
-    let paths = (0..files.len()).filter_map(|index| files.get(index));
     let files = Files {
-        paths: paths.map(Path::to_owned).collect(),
+        paths: files,
         are_in_order: true,
     };
     open_files(path, &files, options)
@@ -73,7 +72,7 @@ struct Scans {
     described: Described,
     options: DatasetOptions,
     index: Index,
-    files: FileList,
+    files: Vec<PathBuf>,
     /// The spans that were read last, and their messages of scans.
     kept: (Option<RangeInclusive<u32>>, BTreeMap<Key, Message>),
 }
@@ -198,7 +197,7 @@ impl Dataset for Scans {
         &self.properties
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.files
     }
 
