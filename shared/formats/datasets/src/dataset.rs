@@ -160,7 +160,7 @@ pub trait Dataset: Send {
         self.nominal_stamp_ns(index)
     }
 
-    /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
+    /// Decodes a scan into `slot`, whose slices must be at least as long as [`Dataset::limits`].
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
     /// Reads the samples of another sensor that the recording itself has, on the topic of this
@@ -187,25 +187,6 @@ pub trait Dataset: Send {
     fn samples(&self) -> &[Sample] {
         &[]
     }
-}
-
-/// Checks that a slot is as large as the limits of a dataset.
-pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-    for (what, needed, actual) in [
-        ("bytes", limits.bytes, slot.bytes.len()),
-        ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
-        ("stamps", limits.azimuths, slot.stamp_ns.len()),
-        ("flags", limits.azimuths, slot.flags.len()),
-    ] {
-        if actual < needed {
-            return Err(ReadError::SlotTooSmall {
-                what,
-                needed,
-                actual,
-            });
-        }
-    }
-    Ok(())
 }
 
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images

@@ -19,7 +19,7 @@ mod wheel_log;
 
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, Format,
-    ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError, check_capacity,
+    ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError,
     correct_eccentricity, encoder_counts, foreign, frame_stamps, is_dataset, middle_ns, open,
     open_resolved, open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };

@@ -94,12 +94,7 @@ impl Images {
         let len = self.files.len();
         let path = self.files.get(index);
         let path = path.ok_or(ReadError::NoSuchScan { index, len })?;
-        let (actual, needed) = (pixels.len(), self.size.width * rows.end());
-        let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
-            what: "bytes",
-            needed,
-            actual,
-        })?;
+        let pixels = &mut pixels[..self.size.width * rows.end()];
         match &mut self.source {
             None => self.reader.decode(path, self.size, rows, pixels),
             Some(source) => {

@@ -15,7 +15,7 @@ use super::options::{AzimuthSource, DatasetOptions};
 use super::profiles::{Profile, ScanTime};
 use super::row_order;
 use super::stamp;
-use super::{Dataset, Properties, check_capacity};
+use super::{Dataset, Properties};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use std::ops::RangeInclusive;
@@ -223,7 +223,6 @@ impl Dataset for NavtechScans {
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
-        check_capacity(self.limits(), &slot)?;
         let rows = self.accepted_rows();
         let size = self.images.decode(index, rows, slot.bytes)?;
         let (path, profile) = (self.images.file(index), &self.profile);

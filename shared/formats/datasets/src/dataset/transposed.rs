@@ -9,7 +9,7 @@ use super::navtech_png::fill_uniform;
 use super::options::{DatasetOptions, LostAzimuthOption};
 use super::profiles::Profile;
 use super::stale::StaleRows;
-use super::{Dataset, Properties, check_capacity};
+use super::{Dataset, Properties};
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
 use std::path::PathBuf;
 
@@ -143,7 +143,6 @@ impl Dataset for TransposedScans {
         })?;
         let azimuths = self.azimuths();
         let bins = self.images.size.bytes() / azimuths;
-        check_capacity(self.limits(), &slot)?;
         let bytes = &mut slot.bytes[..azimuths * bins];
         // No image is before the first one.
         let before = index.checked_sub(1);

@@ -11,7 +11,7 @@ use std::{
 use gyre_colossus::{Azimuth, SweepAssembler};
 use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError,
-    Properties, ReadError, check_capacity, turn_ns,
+    Properties, ReadError, turn_ns,
 };
 use gyre_radar::{ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
@@ -51,12 +51,9 @@ fn open_files(
     options: &DatasetOptions,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     if options.azimuth_source == Some(AzimuthSource::Uniform) {
-        return Err(OpenError::BadOption {
-            key: "azimuth_source",
-            value: "uniform".to_owned(),
-            format: Some(Format::Ros2Bag),
-            reason: "its azimuths are those of the encoder; leave the key out",
-        });
+        let (format, key) = (Some(Format::Ros2Bag), "azimuth_source");
+        let reason = "its azimuths are those of the encoder; leave the key out";
+        return Err(OpenError::option(format, key, "uniform", reason));
     }
     Ok(Box::new(Scans::open(path, files, options)?))
 }
@@ -231,7 +228,6 @@ impl Dataset for Scans {
         let len = self.len();
         let entry = self.index.entries.get(index).cloned();
         let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
-        check_capacity(self.limits(), &slot)?;
         let path = self.file(index).to_owned();
         let failed = |error: RecordingError| error.of_scan(&path);
         if entry.is_damaged {
