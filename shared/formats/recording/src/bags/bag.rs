@@ -6,11 +6,12 @@ use std::{
 };
 
 use gyre_datasets::DatasetOptions;
+use gyre_ros2_messages::radar::DescribedRadar;
 
 use crate::{
     bags::{
         Channel, McapFile, Message, RecordingError,
-        azimuths::{Described, described},
+        azimuths::described,
         files::{Files, compressed},
         radar::{ENCODER_COUNTS, Survey},
         spans::{TimedSpan, spans},
@@ -19,7 +20,7 @@ use crate::{
     file::{Span, Times, joined},
 };
 
-type OwnDescription = Result<Described, String>;
+type OwnDescription = Result<DescribedRadar, String>;
 
 pub(crate) struct Bag {
     path: PathBuf,
@@ -161,7 +162,7 @@ impl Bag {
         &mut self,
         topics: &Topics,
         options: &DatasetOptions,
-    ) -> Result<(Described, String), RecordingError> {
+    ) -> Result<(DescribedRadar, String), RecordingError> {
         let (survey, own) = self.survey(topics)?;
         let usual = match &own {
             Some(Ok(own)) => own.radar.encoder_size,

@@ -14,11 +14,12 @@ use gyre_datasets::{
     Properties, ReadError, turn_ns,
 };
 use gyre_radar::{ScanSlot, SweepGeometry};
+use gyre_ros2_messages::radar::DescribedRadar;
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::{Described, azimuths},
+    azimuths::azimuths,
     bag::{Bag, Key},
     files::{Files, files},
     fixes, samples,
@@ -66,7 +67,7 @@ struct Scans {
     properties: Properties,
     bag: Bag,
     topics: Topics,
-    described: Described,
+    described: DescribedRadar,
     options: DatasetOptions,
     index: Index,
     files: Vec<PathBuf>,

@@ -9,10 +9,11 @@ use std::{
 
 use gyre_colossus::{Azimuth, Counters, FoundClock, RadarClock, SweepAssembler};
 use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_ros2_messages::radar::DescribedRadar;
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::{Described, azimuths},
+    azimuths::azimuths,
     bag::{Bag, Key},
     topics::{Kind, Topics},
 };
@@ -59,7 +60,7 @@ impl Index {
     pub fn of(
         bag: &mut Bag,
         topics: &Topics,
-        described: &Described,
+        described: &DescribedRadar,
         assembler: SweepAssembler,
     ) -> Result<Self, RecordingError> {
         let mut indexing = Indexing::new(topics.scans.kind, described, assembler);
@@ -142,7 +143,7 @@ impl Index {
 
 struct Indexing {
     kind: Kind,
-    described: Described,
+    described: DescribedRadar,
     clock: RadarClock,
     found: Option<FoundClock>,
     assembler: SweepAssembler,
@@ -158,7 +159,7 @@ struct Indexing {
 }
 
 impl Indexing {
-    fn new(kind: Kind, described: &Described, assembler: SweepAssembler) -> Self {
+    fn new(kind: Kind, described: &DescribedRadar, assembler: SweepAssembler) -> Self {
         let (limits, clock) = (assembler.limits(), RadarClock::new(&described.radar));
         Self {
             kind,
