@@ -138,7 +138,7 @@ impl ScanAssembly {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_colossus::{ClockFormat, Powers};
+    use gyre_colossus::ClockFormat;
 
     use super::*;
 
@@ -180,7 +180,7 @@ mod tests {
                 encoder: row * 14,
                 seconds,
                 split_seconds,
-                powers: Powers::Eight(&[7; 16]),
+                powers: &[7; 16],
             };
             let (header, bytes) = (&mut self.header, &mut self.bytes);
             let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);

@@ -2,7 +2,6 @@
 //! bit.
 
 mod counters;
-mod powers;
 mod rows;
 mod seam;
 
