@@ -69,7 +69,9 @@ impl SweepAssembler {
         };
         checked.check()?;
         Ok(Self {
-            grid: Grid::new(configuration),
+            grid: Grid {
+                radar: *configuration,
+            },
             rows: RowWriter::new(configuration),
             constants,
             range_resolution_m: resolution_m,

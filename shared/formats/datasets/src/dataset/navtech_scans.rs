@@ -9,7 +9,7 @@ use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_size::ImageSize;
 use super::images::Images;
-use super::navtech_notes::{note_encoder, observations};
+use super::navtech_notes::observations;
 use super::navtech_png::{self, METADATA_BYTES};
 use super::options::{AzimuthSource, DatasetOptions};
 use super::profiles::{Profile, ScanTime};
@@ -88,8 +88,8 @@ impl NavtechScans {
             scans.max_sweep_ns = MAX_SWEEP_PERIODS * turn_ns;
         }
         if let Some(image) = &first_image {
-            if scans.has_encoder() {
-                scans.find_encoder(image, turn_ns, options.encoder_counts.is_some());
+            if scans.has_encoder() && options.encoder_counts.is_none() {
+                scans.find_encoder(image, turn_ns);
             }
             let notes = observations(image, format, &scans.profile);
             scans.properties.notes.extend(notes);
@@ -99,16 +99,12 @@ impl NavtechScans {
         Ok(scans)
     }
 
-    /// Takes the size of the encoder that the first images show, unless it is the usual one. If it
-    /// is configured, or the first image took less or more than a turn, the size is only reported.
-    fn find_encoder(&mut self, image: &FirstImage, turn_ns: Option<i64>, is_configured: bool) {
+    /// Takes the size of the encoder that the first images show, unless it is the usual one, or the
+    /// first image took less or more than a turn.
+    fn find_encoder(&mut self, image: &FirstImage, turn_ns: Option<i64>) {
         let usual = self.profile.encoder_counts;
         let by_first = encoder_counts(&[image.turn()], turn_ns, usual);
-        if is_configured || by_first.is_none() {
-            let note = note_encoder(image, &self.profile);
-            return self.properties.notes.extend(note);
-        }
-        if by_first == Some(usual) {
+        if by_first.is_none_or(|counts| counts == usual) {
             return;
         }
         let found = encoder_counts(&self.first_turns(), turn_ns, usual);

@@ -25,9 +25,6 @@ const GAP_PERIODS: f64 = 3.0 + 1e-6;
 const SPREAD: &str = "samples come in bursts of one stamp: spread evenly back to the burst before.";
 const MEASURED_TWICE: &str = "samples are of times over which the clock was set back, and which have two measurements: left out.";
 
-/// Counters of 32 bits overflow after so long, if they count ns, µs or ms, s.
-const OVERFLOWS_S: [f64; 3] = [4.294967296, 4294.967296, 4294967.296];
-
 /// Faults of a log. Its samples do not include the ones counted as left out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LogFaults {
@@ -83,14 +80,8 @@ impl LogFaults {
         let (count, first) = (self.clock_steps_s.len(), self.first_clock_step);
         let steps = self.clock_steps_s.iter().take(5);
         let steps: Vec<String> = steps.map(|step| format!("{step:+.6} s")).collect();
-        let is_near = |step: f64, it: &f64| (step.abs() - it).abs() < 1e-3 * it;
-        let wraps = |step: &f64| OVERFLOWS_S.iter().any(|it| is_near(*step, it));
-        let counter = match self.clock_steps_s.iter().any(wraps) {
-            true => ", as a counter of 32 bits that overflows: write stamps of 64 bits",
-            false => "",
-        };
         let steps = steps.join(", ");
-        format!("The clock steps {count} times ({steps}), first behind sample {first}{counter}")
+        format!("The clock steps {count} times ({steps}), first behind sample {first}")
     }
 
     /// Returns a sentence for each kind of fault of the log of a sensor.

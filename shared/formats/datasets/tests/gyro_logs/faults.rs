@@ -219,8 +219,6 @@ fn stamps_that_are_no_clock_are_refused_with_the_steps() {
         for words in [words, "first behind sample 2"] {
             assert!(refused.contains(words), "{refused}");
         }
-        let is_counter = refused.contains("a counter of 32 bits");
-        assert_eq!(is_counter, step_ns == 1 << 32, "{refused}");
     }
 }
 
