@@ -411,7 +411,7 @@ fn an_archive_that_is_named_as_a_recording_is_called_what_it_is() {
             .to_string()
     };
     for (bytes, words) in [
-        (&b"PK\x03\x04...."[..], "is a ZIP archive"),
+        (&b"PK\x03\x04...."[..], "is an archive"),
         (b"#ROSBAG V2.0\n", "is a bag of ROS 1"),
         (b"something", "signature of MCAP"),
     ] {

@@ -13,20 +13,19 @@ type Kind = (usize, &'static [u8], &'static str);
 
 const BAG: &str = "a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap` (pip install rosbags), and name that folder";
 const DATABASE: &str = "an SQLite database, as bags of ROS 2 may be: convert it with `ros2 bag convert` and `storage_id: mcap`";
-const CONVERTED: [Kind; 2] = [(0, b"#ROSBAG V", BAG), (0, b"SQLite format 3\0", DATABASE)];
-const UNPACKED: [Kind; 8] = [
-    (0, b"PK\x03\x04", "a ZIP archive"),
-    (257, b"ustar", "a tar archive"),
-    (0, b"\x1f\x8b", "compressed by gzip, as a .tar.gz is"),
-    (0, b"BZh", "compressed by bzip2, as a .tar.bz2 is"),
-    (0, b"\xfd7zXZ\0", "compressed by xz, as a .tar.xz is"),
-    (
-        0,
-        b"\x28\xb5\x2f\xfd",
-        "compressed by Zstandard, as a .tar.zst is",
-    ),
-    (0, b"7z\xbc\xaf\x27\x1c", "a 7z archive"),
-    (0, b"Rar!\x1a\x07", "a RAR archive"),
+const ARCHIVE: &str = "an archive, or compressed: unpack it, and name the folder that it held";
+const KINDS: [Kind; 10] = [
+    (0, b"#ROSBAG V", BAG),
+    (0, b"SQLite format 3\0", DATABASE),
+    // ZIP, tar, gzip, bzip2, xz, Zstandard, 7z and RAR.
+    (0, b"PK\x03\x04", ARCHIVE),
+    (257, b"ustar", ARCHIVE),
+    (0, b"\x1f\x8b", ARCHIVE),
+    (0, b"BZh", ARCHIVE),
+    (0, b"\xfd7zXZ\0", ARCHIVE),
+    (0, b"\x28\xb5\x2f\xfd", ARCHIVE),
+    (0, b"7z\xbc\xaf\x27\x1c", ARCHIVE),
+    (0, b"Rar!\x1a\x07", ARCHIVE),
 ];
 
 /// Returns an error that names the type of the file, if it is one of these.
@@ -38,11 +37,8 @@ pub fn foreign(path: &Path) -> Option<OpenError> {
         let bytes = head.get(*at..);
         bytes.is_some_and(|bytes| bytes.starts_with(signature))
     };
-    let packed = UNPACKED.iter().find(has);
-    let packed =
-        packed.map(|(.., kind)| format!("is {kind}: unpack it, and name the folder that it held"));
-    let other = || Some(format!("is {}", CONVERTED.iter().find(has)?.2));
-    Some(OpenError::at(path, packed.or_else(other)?))
+    let (.., kind) = KINDS.iter().find(has)?;
+    Some(OpenError::at(path, format_args!("is {kind}")))
 }
 
 pub(crate) fn foreign_in(folder: &Path) -> Option<OpenError> {

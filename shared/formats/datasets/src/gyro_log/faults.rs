@@ -66,15 +66,6 @@ pub struct LogGap {
 }
 
 impl LogFaults {
-    pub fn left_out(&self) -> usize {
-        self.unreadable
-            + self.not_a_number
-            + self.absurd
-            + self.repeated
-            + self.measured_twice
-            + self.by_clock_steps
-    }
-
     /// Returns how the clock steps, and where first: without a full stop.
     pub fn clock_steps(&self) -> String {
         let (count, first) = (self.clock_steps_s.len(), self.first_clock_step);
