@@ -29,9 +29,8 @@ pub use gnss_log::{GnssFaults, GnssLog, LoggedFix, ReceivedFixes};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
-pub use gyro_log::{GyroLog, LogFaults, LogGap};
+pub use gyro_log::{LogFaults, LogGap, SampleLog};
 pub use inspect::{InspectedLogs, Report, inspect, inspect_dataset};
 pub use logs::LogError;
 pub use plain_words::{clipped, in_plain_words};
 pub use scan_samples::ScanSamples;
-pub use wheel_log::WheelLog;

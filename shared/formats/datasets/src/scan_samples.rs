@@ -7,9 +7,9 @@ use gyre_samples::{
 };
 
 use crate::{
-    LogError, WheelLog,
+    LogError, SampleLog,
     dataset::{Dataset, Format},
-    gyro_log::{GyroLog, LogFaults, jumps},
+    gyro_log::{LogFaults, jumps},
 };
 
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
@@ -40,23 +40,25 @@ impl ScanSamples {
         let turns = match gyro.kind {
             GyroKind::None => None,
             GyroKind::Udp | GyroKind::Ros2 => return live(SampleKind::Gyro),
-            GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
+            GyroKind::Log => Some(SampleLog::read_gyro(
+                &gyro.file.clone().unwrap_or_default(),
+            )?),
             GyroKind::Auto => Some(
                 match dataset.logged(SampleKind::Gyro, gyro.topic.as_deref())? {
-                    Some(samples) => GyroLog::of(samples, folder)?,
-                    None => GyroLog::read(&GyroLog::find(folder)?)?,
+                    Some(samples) => SampleLog::of_gyro(samples, folder)?,
+                    None => SampleLog::read_gyro(&SampleLog::find_gyro(folder)?)?,
                 },
             ),
         };
-        let read = |file: &Path| WheelLog::read(file, wheels.m_per_tick);
+        let read = |file: &Path| SampleLog::read_wheels(file, wheels.m_per_tick);
         let speeds = match wheels.kind {
             WheelsKind::None => None,
             WheelsKind::Udp | WheelsKind::Ros2 => return live(SampleKind::Wheels),
             WheelsKind::Log => Some(read(&wheels.file.clone().unwrap_or_default())?),
             WheelsKind::Auto => Some(
                 match dataset.logged(SampleKind::Wheels, wheels.topic.as_deref())? {
-                    Some(samples) => WheelLog::of(samples, folder)?,
-                    None => read(&WheelLog::find(folder)?)?,
+                    Some(samples) => SampleLog::of_wheels(samples, folder)?,
+                    None => read(&SampleLog::find_wheels(folder)?)?,
                 },
             ),
         };
@@ -71,7 +73,7 @@ impl ScanSamples {
     }
 
     pub fn of_gyro(
-        log: &GyroLog,
+        log: &SampleLog,
         config: &GyroConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
@@ -84,7 +86,7 @@ impl ScanSamples {
     }
 
     pub fn of_wheels(
-        log: &WheelLog,
+        log: &SampleLog,
         config: &WheelsConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
@@ -283,7 +285,7 @@ mod tests {
             values: [0.1, 0.2, -0.3, 1.0, 2.0, -9.8],
             ..Sample::yaw_rate(5_000_000_000, 0.0)
         };
-        let log = GyroLog::of(vec![sample], Path::new("log")).unwrap();
+        let log = SampleLog::of_gyro(vec![sample], Path::new("log")).unwrap();
         let config = GyroConfig {
             delay_s: 1.58,
             up: Some(MinusZ),

@@ -12,7 +12,7 @@ use gyre_samples::{Sample, SampleKind};
 use counts::CountColumns;
 
 use crate::{
-    LogError, LogFaults,
+    LogError, SampleLog,
     gyro_log::faults::{Plausible, examine},
     header::{Header, Sign, Stamp, unit_of},
     logs,
@@ -31,50 +31,29 @@ const SPEEDS: Plausible = Plausible {
     beyond: "have speeds beyond 100 m/s: if they are in km/h, name the column so, as speed_km_h",
 };
 
-/// The log of the wheels, on its own clock.
-#[derive(Clone, Debug, Default)]
-pub struct WheelLog {
-    /// The samples in the order of their stamps, which all differ, in m/s.
-    pub samples: Vec<Sample>,
-    pub faults: LogFaults,
-    pub path: PathBuf,
-}
-
-impl WheelLog {
-    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or in
-    /// `stamp_ns,ticks` for ticks of `m_per_tick` metres.
-    pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
+impl SampleLog {
+    /// Reads the log of the wheels. Its first row names the columns, as in `stamp_ns,speed_m_s`, or
+    /// in `stamp_ns,ticks` for ticks of `m_per_tick` metres.
+    pub fn read_wheels(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
         let no_speed = match logs::rows::<SpeedColumns>(path, OF) {
-            Ok(rows) => return Self::examined(rows.raw, rows.columns.unit.is_none(), path),
+            Ok(rows) => return examine(rows.raw, rows.columns.unit.is_none(), path, &SPEEDS),
             Err(error) => error,
         };
         match logs::rows::<CountColumns>(path, OF) {
-            Ok(rows) => Ok(Self::with(counts::speeds(rows, path, m_per_tick)?, path)),
+            Ok(rows) => counts::speeds(rows, path, m_per_tick),
             Err(_) => Err(no_speed),
         }
     }
 
     /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
     /// images.
-    pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
+    pub fn find_wheels(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES)
     }
 
-    /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
-        Self::examined(Raw::of(samples), false, path)
-    }
-
-    fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
-        examine(raw, unit_is_assumed, path, &SPEEDS).map(|examined| Self::with(examined, path))
-    }
-
-    fn with((samples, faults): (Vec<Sample>, LogFaults), path: &Path) -> Self {
-        Self {
-            samples,
-            faults,
-            path: path.to_owned(),
-        }
+    /// Takes the samples of wheels in a bag or a simulation, which messages name by this path.
+    pub fn of_wheels(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
+        examine(Raw::of(samples), false, path, &SPEEDS)
     }
 }
 

@@ -6,6 +6,8 @@ mod order;
 
 use std::path::Path;
 
+use super::SampleLog;
+
 use gyre_radar::median;
 use serde::Serialize;
 
@@ -153,7 +155,7 @@ pub(crate) fn examine(
     unit_is_assumed: bool,
     path: &Path,
     plausible: &Plausible,
-) -> Result<(Vec<Sample>, LogFaults), LogError> {
+) -> Result<SampleLog, LogError> {
     let unusable = |reason: String| LogError::unusable(plausible.of.section(), path, reason);
     let mut faults = LogFaults {
         unreadable: raw.unreadable.count,
@@ -188,7 +190,11 @@ pub(crate) fn examine(
         return Err(unusable("it has no samples".to_owned()));
     }
     (faults.gaps, faults.bridged) = gaps(&samples);
-    Ok((samples, faults))
+    Ok(SampleLog {
+        samples,
+        faults,
+        path: path.to_owned(),
+    })
 }
 
 /// Times without samples, of samples in the order of their stamps, and the number of samples that
