@@ -14,7 +14,7 @@ use counts::CountColumns;
 use crate::{
     LogError, SampleLog,
     gyro_log::faults::{Plausible, examine},
-    header::{Header, Sign, Stamp, unit_of},
+    header::{Header, Stamp, unit_of},
     logs,
     table::{Columns, Raw},
 };
@@ -67,55 +67,38 @@ const UNITS: [(&str, f64); 3] = [
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
 
 /// Columns with the direction of a speed that has no sign.
-const DIRECTION: Sign = Sign {
-    names: "direction driving_direction travel_direction",
-    plus: "1 +1 f d forward forwards",
-    minus: "-1 b r backward backwards reverse",
-};
-const REVERSE: Sign = Sign {
-    names: "reverse is_reverse reversing",
-    plus: "0 false",
-    minus: "1 true",
-};
-
-const SIGNS: [&Sign; 2] = [&DIRECTION, &REVERSE];
+const DIRECTIONS: &str =
+    "direction driving_direction travel_direction reverse is_reverse reversing";
 
 struct SpeedColumns {
     stamp: Stamp,
     speed: usize,
     /// Factor that makes speeds m/s; `None`: it is named nowhere.
     unit: Option<f64>,
-    sign: Option<(usize, &'static Sign)>,
 }
 
 impl Columns for SpeedColumns {
     type Entry = Sample;
 
     fn by_names(header: &Header) -> Result<Self, String> {
-        let sign = header.sign(&SIGNS);
         let columns = header.listed();
-        let missing = |what| match sign {
-            Some(_) => format!(
-                "its columns {columns} have a direction, which is applied to speeds alone: let the counts run backwards, and remove the direction"
-            ),
-            None => format!("its columns {columns} have no {what}: {REMEDY}"),
-        };
+        if header.find(DIRECTIONS).is_some() {
+            return Err(format!(
+                "its columns {columns} have a direction: write what goes backwards with a minus, and remove the direction"
+            ));
+        }
+        let missing = |what| format!("its columns {columns} have no {what}: {REMEDY}");
         let speed = header.first(|name| unit_of(name, NAMES, &UNITS));
         let (speed, unit) = speed.ok_or_else(|| missing("speed"))?;
         Ok(Self {
             stamp: header.stamp().ok_or_else(|| missing("stamps"))?,
             speed,
             unit,
-            sign,
         })
     }
 
     fn entry(&self, row: &StringRecord) -> Option<Sample> {
         let speed = row.get(self.speed)?.parse::<f64>().ok()? * self.unit.unwrap_or(1.0);
-        let speed = match self.sign {
-            Some((column, sign)) => sign.apply(speed, row.get(column)?)?,
-            None => speed,
-        };
         Some(Sample::speed(self.stamp.ns(row)?, speed))
     }
 }

@@ -45,7 +45,7 @@ impl Columns for CountColumns {
     type Entry = Sample;
 
     fn by_names(header: &Header) -> Result<Self, String> {
-        if header.sign(&super::SIGNS).is_some() {
+        if header.find(super::DIRECTIONS).is_some() {
             return Err("its direction is not applied to counts".to_owned());
         }
         let one = |all: &[&str]| all.iter().find_map(|name| Some(vec![header.find(name)?]));

@@ -131,15 +131,6 @@ impl Scans {
         Ok(())
     }
 
-    fn why_damaged(&mut self, entry: &Entry) -> Result<String, RecordingError> {
-        self.keep(&entry.spans)?;
-        let message = self.kept.1.get(&entry.start.message);
-        let decoded = message
-            .map(|message| azimuths(self.topics.scans.kind, message, &self.described, |_, _| {}));
-        let reason = decoded.and_then(Result::err);
-        Ok(reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned()))
-    }
-
     fn assemble(
         &mut self,
         index: usize,
@@ -231,8 +222,7 @@ impl Dataset for Scans {
         let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
         let path = self.file(index).to_owned();
         let failed = |error: RecordingError| error.of_scan(&path);
-        if entry.is_damaged {
-            let reason = self.why_damaged(&entry).map_err(failed)?;
+        if let Some(reason) = &entry.damage {
             return Err(ReadError::Scan(format!(
                 "the message of scan {index} in {} cannot be decoded: {reason}",
                 path.display()

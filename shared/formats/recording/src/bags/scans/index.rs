@@ -37,8 +37,8 @@ pub(super) struct Entry {
     pub spans: RangeInclusive<u32>,
     pub stamp_ns: i64,
     pub logged_ns: i64,
-    /// A whole turn in a message that cannot be decoded.
-    pub is_damaged: bool,
+    /// Why the message of a whole turn cannot be decoded.
+    pub damage: Option<String>,
 }
 
 pub(super) struct Index {
@@ -82,7 +82,7 @@ impl Index {
 
     /// Returns why no scan on a topic can be read; `None` if one can be.
     pub fn why_none_can_be_read(&self, topic: &str) -> Option<String> {
-        if self.entries.iter().any(|entry| !entry.is_damaged) {
+        if self.entries.iter().any(|entry| entry.damage.is_none()) {
             return None;
         }
         let (lost, azimuths) = (&self.counters, self.azimuths);
@@ -200,8 +200,9 @@ impl Indexing {
             place.row += 1;
         });
         if let Err(reason) = added {
-            self.index.first_damage.get_or_insert(reason);
-            self.add_damaged(place, message.log_ns);
+            let first = &mut self.index.first_damage;
+            first.get_or_insert_with(|| reason.clone());
+            self.add_damaged(place, message.log_ns, reason);
         }
     }
 
@@ -252,7 +253,7 @@ impl Indexing {
                     spans: self.spans.clone(),
                     stamp_ns: sweep.geometry.stamp_ns,
                     logged_ns,
-                    is_damaged: false,
+                    damage: None,
                 });
                 let start = self.previous.unwrap_or(here);
                 (self.start, self.spans) = (Some(start), joined(&only(start), here));
@@ -281,7 +282,7 @@ impl Indexing {
     }
 
     /// A message that is a whole turn is a scan that cannot be read.
-    fn add_damaged(&mut self, place: Place, logged_ns: i64) {
+    fn add_damaged(&mut self, place: Place, logged_ns: i64, reason: String) {
         self.index.damaged_messages += 1;
         if matches!(self.kind, Kind::BScans | Kind::Images) {
             self.index.entries.push(Entry {
@@ -290,7 +291,7 @@ impl Indexing {
                 spans: only(place),
                 stamp_ns: logged_ns,
                 logged_ns,
-                is_damaged: true,
+                damage: Some(reason),
             });
         }
     }
