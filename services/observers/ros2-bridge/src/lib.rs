@@ -15,6 +15,6 @@ mod settings;
 pub mod source;
 
 pub use bridge::Bridge;
-pub use gyre_ros2_messages::{BadMounting, Mounting, frames::Frames};
+pub use gyre_ros2_messages::{Mounting, frames::Frames};
 pub use node::NodeError;
 pub use settings::{MapSettings, MapSettingsOf, Settings};

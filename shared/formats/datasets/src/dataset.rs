@@ -39,7 +39,6 @@ pub use detect::is_dataset;
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 pub use error::{OpenError, ReadError};
-pub use foreign::foreign;
 pub use format::Format;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;

@@ -210,13 +210,21 @@ fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> 
     })
 }
 
-fn check_increasing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
-    match stamps.last() {
-        Some(last) if next < *last => {
-            let back_s = (last - next) as f64 * 1e-9;
+/// Collects what rows have at their times, which must not run backwards.
+fn stamped<'a, T>(
+    rows: impl Iterator<Item = (usize, &'a str)>,
+    parse: impl Fn(usize, &str) -> Result<(i64, T), LineError>,
+) -> Result<(Vec<i64>, Vec<T>), LineError> {
+    let (mut stamps, mut values) = (Vec::<i64>::new(), Vec::new());
+    for (line, row) in rows {
+        let (stamp, value) = parse(line, row)?;
+        if let Some(last) = stamps.last().filter(|last| stamp < **last) {
+            let back_s = (last - stamp) as f64 * 1e-9;
             let reason = format!("time runs backwards by {back_s:.6} s");
-            Err(LineError::new(line, reason))
+            return Err(LineError::new(line, reason));
         }
-        _ => Ok(()),
+        stamps.push(stamp);
+        values.push(value);
     }
+    Ok((stamps, values))
 }

@@ -20,8 +20,8 @@ mod wheel_log;
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, Format,
     ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError,
-    correct_eccentricity, encoder_counts, foreign, frame_stamps, is_dataset, middle_ns, open,
-    open_resolved, open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
+    correct_eccentricity, encoder_counts, frame_stamps, is_dataset, middle_ns, open, open_resolved,
+    open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use first_scan::check_first_scan;

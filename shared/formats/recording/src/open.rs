@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, foreign};
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError};
 
 use crate::{
-    Recording, RecordingError,
+    Recording,
     bags::{self, is_bag},
     parts::{first_part_in, parts},
     scans::Scans,
@@ -77,13 +77,7 @@ fn recording_of(paths: &[PathBuf], root: &Path) -> Result<Recording, OpenError> 
         let reason = format!("there is no recording {}", root.display());
         return Err(OpenError::Recording(reason));
     }
-    Recording::open(paths).map_err(|error| {
-        // It may be an archive that is only named as a recording.
-        let is_other = !matches!(error, RecordingError::Io { .. });
-        let archive = paths.first().filter(|_| is_other);
-        let archive = archive.and_then(|path| foreign(path));
-        archive.unwrap_or_else(|| error.into())
-    })
+    Ok(Recording::open(paths)?)
 }
 
 fn open_parts(

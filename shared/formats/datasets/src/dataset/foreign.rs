@@ -29,7 +29,7 @@ const KINDS: [Kind; 10] = [
 ];
 
 /// Returns an error that names the type of the file, if it is one of these.
-pub fn foreign(path: &Path) -> Option<OpenError> {
+pub(crate) fn foreign(path: &Path) -> Option<OpenError> {
     let mut head = Vec::new();
     let file = gyre_storage::open(path).ok()?;
     file.take(HEAD_BYTES).read_to_end(&mut head).ok()?;
