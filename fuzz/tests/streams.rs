@@ -143,7 +143,9 @@ impl Client {
 
     fn add(&mut self, azimuth: Azimuth<'_>) -> Result<(), Failure> {
         for (azimuth, stamp_ns) in self.clock.stamp(azimuth, START_NS) {
-            let sweep = self.assembler.add(&azimuth, stamp_ns, self.scan.slot());
+            let sweep = self
+                .assembler
+                .add(&azimuth, stamp_ns, &mut self.scan.slot());
             if let Some(sweep) = sweep {
                 self.sweeps += 1;
                 self.scan.geometry = sweep.geometry;

@@ -63,7 +63,9 @@ impl ScanAssembly {
             let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
             let is_start = self.assembler.is_first(azimuth.encoder);
             turns.note(LastScan { stamp_ns, at_ns }, fraction.fract(), is_start);
-            complete = self.assembler.add(&azimuth, stamp_ns, header.slot(bytes));
+            complete = self
+                .assembler
+                .add(&azimuth, stamp_ns, &mut header.slot(bytes));
             if complete.is_some() {
                 break;
             }

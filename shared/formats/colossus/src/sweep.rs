@@ -119,10 +119,9 @@ impl SweepAssembler {
         &mut self,
         azimuth: &Azimuth<'_>,
         stamp_ns: i64,
-        mut slot: ScanSlot<'_>,
+        slot: &mut ScanSlot<'_>,
     ) -> Option<Sweep> {
-        self.rows.assert_fits(&slot);
-        let slot = &mut slot;
+        self.rows.assert_fits(slot);
         self.write_kept(slot);
         let Some(encoder) = self.grid.encoder(azimuth.encoder) else {
             self.counters.invalid_azimuths += 1;

@@ -88,7 +88,7 @@ impl Assembly {
 
     /// Adds an azimuth, and returns whether it completes a sweep.
     pub fn add(&mut self, azimuth: &Azimuth<'_>, stamp_ns: i64) -> bool {
-        let sweep = self.assembler.add(azimuth, stamp_ns, self.slot.slot());
+        let sweep = self.assembler.add(azimuth, stamp_ns, &mut self.slot.slot());
         if let Some(sweep) = sweep {
             self.slot.geometry = sweep.geometry;
             let scan = self.slot.view();

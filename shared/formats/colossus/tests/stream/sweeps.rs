@@ -185,7 +185,7 @@ fn a_scan_has_the_constants_given() {
     let rows = turns(&radar, 0, START_NS, 1);
     let mut sweeps = rows.iter().filter_map(|row| {
         let azimuth = row.azimuth(ClockFormat::default());
-        assembler.add(&azimuth, row.stamp_ns, scan.slot())
+        assembler.add(&azimuth, row.stamp_ns, &mut scan.slot())
     });
     let geometry = sweeps.next().unwrap().geometry;
     assert_eq!(geometry.range_resolution_m, 0.0596);

@@ -34,18 +34,10 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
         Some(text) => text.clone(),
         None => read_list(&list)?,
     };
-    let (stamps, unpadded) = parse_stamps(&list, &text)?;
+    let stamps = parse_stamps(&list, &text)?;
     let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
     scans.stale = scans.stale.map(StaleRows::of_compressed);
     add_turns(&mut scans, &stamps, &list)?;
-    if unpadded > 0 {
-        scans.properties.notes.push(format!(
-            "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
-             read as decimals, time would run backwards.",
-            stamps.len(),
-            file_name(&list)
-        ));
-    }
     if stamps.len() > scans.turns.len() {
         scans.properties.notes.push(format!(
             "{} lists {} scans, but there are {} images.",
@@ -59,7 +51,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
 
 /// Reads a list of `Frame: <number> Time: <seconds>.<nanoseconds>`: the times by frame number, ns.
 pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
-    Ok(parse_stamps(list, &read_list(list)?)?.0)
+    parse_stamps(list, &read_list(list)?)
 }
 
 fn read_list(list: &Path) -> Result<String, OpenError> {
@@ -200,11 +192,11 @@ fn receipts(
     Err(OpenError::at(list, fault))
 }
 
-fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
-    let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
+fn parse_stamps(path: &Path, text: &str) -> Result<BTreeMap<i64, i64>, OpenError> {
+    let mut stamps = BTreeMap::new();
     let lines = text.lines().enumerate();
     for (line, content) in lines.filter(|(_, content)| !content.trim().is_empty()) {
-        let (frame, ns, digits) = parse_line(content).ok_or_else(|| {
+        let (frame, ns) = parse_line(content).ok_or_else(|| {
             OpenError::Recording(format!(
                 "{}, line {}: {} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040",
                 path.display(),
@@ -212,14 +204,13 @@ fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), 
                 quoted(content)
             ))
         })?;
-        unpadded += usize::from(digits < 9);
         stamps.insert(frame, ns);
     }
-    Ok((stamps, unpadded))
+    Ok(stamps)
 }
 
-/// `Frame: 000248 Time: 1549986609.260809657`: number, ns, digits after the dot.
-fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
+/// `Frame: 000248 Time: 1549986609.260809657`: number, ns.
+fn parse_line(line: &str) -> Option<Receipt> {
     let mut words = line.split_whitespace();
     let (frame, number, time, value) = (words.next()?, words.next()?, words.next()?, words.next()?);
     let (seconds, nanoseconds) = value.split_once('.')?;
@@ -228,7 +219,7 @@ fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
     let seconds: i64 = seconds.parse().ok()?;
     let stamp = seconds.checked_mul(SECOND_NS)?.checked_add(ns)?;
     let labelled = frame == "Frame:" && time == "Time:" && stamp::plausible(stamp);
-    labelled.then_some((number.parse().ok()?, stamp, nanoseconds.len()))
+    labelled.then_some((number.parse().ok()?, stamp))
 }
 
 #[cfg(test)]
@@ -239,9 +230,9 @@ mod tests {
     #[test]
     fn nanoseconds_without_leading_zeros_are_integers() {
         let line = parse_line("Frame: 000243 Time: 1549986608.1533537");
-        assert_eq!(line, Some((243, 1_549_986_608_001_533_537, 7)));
+        assert_eq!(line, Some((243, 1_549_986_608_001_533_537)));
         let line = parse_line("Frame: 1 Time: 1549986608.0");
-        assert_eq!(line, Some((1, 1_549_986_608_000_000_000, 1)));
+        assert_eq!(line, Some((1, 1_549_986_608_000_000_000)));
         for bad in [
             "Frame: 1 Time: 1549986608",
             "Frame: 1 Time: 1549986608.1234567890",

@@ -158,7 +158,7 @@ impl Scans {
                 }
                 for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
                     if found.is_none() {
-                        found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
+                        found = assembler.add(&azimuth, stamp_ns, &mut slot);
                     }
                 }
             };
@@ -169,15 +169,6 @@ impl Scans {
             }
         }
         Ok(found.map(|sweep| sweep.geometry))
-    }
-}
-
-fn reborrow<'a>(slot: &'a mut ScanSlot<'_>) -> ScanSlot<'a> {
-    ScanSlot {
-        bytes: slot.bytes,
-        azimuth_rad: slot.azimuth_rad,
-        stamp_ns: slot.stamp_ns,
-        flags: slot.flags,
     }
 }
 

@@ -246,7 +246,10 @@ impl Indexing {
             });
             self.spans = joined(&self.spans, here);
             let invalid = self.assembler.counters().invalid_azimuths;
-            if let Some(sweep) = self.assembler.add(&azimuth, stamp_ns, self.scan.slot()) {
+            if let Some(sweep) = self
+                .assembler
+                .add(&azimuth, stamp_ns, &mut self.scan.slot())
+            {
                 self.index.entries.push(Entry {
                     start,
                     end: here,
