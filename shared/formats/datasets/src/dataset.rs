@@ -6,7 +6,6 @@ mod eccentricity;
 mod encoder;
 mod error;
 mod first_image;
-mod foreign;
 mod format;
 mod image_list;
 mod image_size;

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
 use super::first_image::FirstImage;
-use super::foreign::{foreign, foreign_in};
 use super::format::Format;
 use super::image_list::has_png;
 use super::image_source::ImageSource;
@@ -131,10 +130,10 @@ fn other_format(root: &Path, configured: Option<Format>) -> Option<OpenError> {
 fn check_folder(root: &Path) -> Result<(), OpenError> {
     match fs::metadata(root) {
         Ok(entry) if entry.is_dir() => Ok(()),
-        Ok(_) => Err(foreign(root).unwrap_or_else(|| {
-            let fault = "is a file: give the folder of the dataset, which holds the radar images or their folder, or a recording or bag of ROS 2 as MCAP";
-            OpenError::at(root, fault)
-        })),
+        Ok(_) => {
+            let fault = "is a file: give the folder of the dataset, which holds the radar images or their folder (unpack an archive before), or a recording or bag of ROS 2 as MCAP (`rosbags-convert` of `pip install rosbags` makes it of a bag of ROS 1)";
+            Err(OpenError::at(root, fault))
+        }
         Err(e) if e.kind() == ErrorKind::NotFound => Err(OpenError::Recording(format!(
             "there is no dataset at {}: no such folder; check the path",
             root.display()
@@ -164,9 +163,6 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
     }
     if fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_none()) {
         return Err(OpenError::no_images(root));
-    }
-    if let Some(error) = foreign_in(root) {
-        return Err(error);
     }
     let mut folders: Vec<&str> = known().copied().collect();
     folders.dedup();

@@ -82,25 +82,14 @@ impl Index {
 
     /// Returns why no scan on a topic can be read; `None` if one can be.
     pub fn why_none_can_be_read(&self, topic: &str) -> Option<String> {
-        if self.entries.iter().any(|entry| entry.damage.is_none()) {
-            return None;
-        }
-        let (lost, azimuths) = (&self.counters, self.azimuths);
-        let (invalid, incomplete) = (lost.invalid_azimuths, lost.incomplete_sweeps);
-        Some(match &self.first_damage {
-            Some(reason) if azimuths == 0 => {
-                format!("has messages on {topic}, of which none can be decoded: {reason}")
-            }
-            _ if azimuths == 0 => format!("has no messages on {topic} that can be read"),
-            _ if lost.broken_sweeps > 0 => format!(
-                "has {azimuths} azimuths on {topic}, but their times do not advance as the radar turns, by its encoder and its rotation"
-            ),
-            _ if invalid > 0 => format!(
-                "has {azimuths} azimuths on {topic}, of which {invalid} have encoder values beyond a turn: set dataset.encoder_counts"
-            ),
-            _ => format!(
-                "has no complete turn of the radar on {topic}: {azimuths} azimuths, {incomplete} turns of which more than half is missing"
-            ),
+        let can_be = self.entries.iter().any(|entry| entry.damage.is_none());
+        let notes: Vec<String> = self.notes();
+        let notes: Vec<&str> = notes.iter().map(|it| it.trim_end_matches('.')).collect();
+        let (azimuths, notes) = (self.azimuths, notes.join("; "));
+        (!can_be).then(|| {
+            format!(
+                "has no complete turn of the radar on {topic} that can be read, and {azimuths} azimuths: {notes}"
+            )
         })
     }
 
@@ -124,11 +113,11 @@ impl Index {
             ),
             (
                 lost.incomplete_sweeps + lost.broken_sweeps,
-                "turns are left out: more than half of their azimuths are missing, or the radar's clock was set.",
+                "turns are left out: more than half of their azimuths are missing, or their times do not advance as the radar turns, as where its clock was set.",
             ),
             (
                 lost.repeated_azimuths + lost.invalid_azimuths + lost.surplus_azimuths,
-                "azimuths are left out: they have the encoder value of the one before, or one beyond a turn, or are more than the radar has.",
+                "azimuths are left out: they have the encoder value of the one before, or one beyond a turn (dataset.encoder_counts), or are more than the radar has.",
             ),
             (
                 lost.cut_rows,
