@@ -83,7 +83,7 @@ impl GnssLog {
             sigma_m: RawFix::sigma_of([first[0], second[1]]),
             ..RawFix::default()
         };
-        Ok((gps_imu_twist::read(path, OF, [0, 1, 2], fix)?, false))
+        Ok((gps_imu_twist::read(path, [0, 1, 2], fix)?, false))
     }
 
     /// Returns all fixes of a log as one table.

@@ -56,7 +56,7 @@ impl SampleLog {
     pub fn read_gyro(path: &Path) -> Result<Self, LogError> {
         if path.is_dir() {
             // The lines of the angular rates and of the accelerations.
-            let raw = gps_imu_twist::read(path, OF, [5, 6], columns::sample)?;
+            let raw = gps_imu_twist::read(path, [5, 6], columns::sample)?;
             return faults::examine(raw, false, path, &faults::RATES);
         }
         let rows = logs::rows::<GyroColumns>(path, OF)?;
