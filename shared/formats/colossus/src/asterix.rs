@@ -166,7 +166,7 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
     if has & 1 << 10 != 0 {
         items.blocks(1, "I240/030")?;
     }
-    let header = header(&mut items, has)?;
+    let (angle, first, resolution_m) = header(&mut items, has)?;
     let powers = cells(&mut items, has)?;
     if has & 1 << 2 != 0 {
         let _time_of_day: [u8; 3] = items.take("I240/140")?;
@@ -178,15 +178,15 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
         return Err(missing("SP"));
     }
     let special = special(&mut items)?;
-    let (first, bins) = (header.first, usize::from(special.bins));
+    let bins = usize::from(special.bins);
     let cells = powers.len();
     if first.saturating_add(cells) > bins {
         return Err(bad_cells([cells, first, cells, bins]));
     }
     Ok(Some(Video {
         number,
-        angle: header.angle,
-        resolution_m: header.resolution_m,
+        angle,
+        resolution_m,
         first,
         powers,
         special,
@@ -219,13 +219,8 @@ fn features(items: &mut Items<'_>) -> Result<u16, Malformed> {
     Ok(u16::from(first >> 1) << 7 | u16::from(second >> 1))
 }
 
-struct Header {
-    angle: u16,
-    first: usize,
-    resolution_m: f32,
-}
-
-fn header(items: &mut Items<'_>, has: u16) -> Result<Header, Malformed> {
+/// Takes the angle, the first bin and the depth of a bin, m.
+fn header(items: &mut Items<'_>, has: u16) -> Result<(u16, usize, f32), Malformed> {
     let (bytes, per_second): ([u8; 12], f64) = if has & 1 << 9 != 0 {
         (items.take("I240/040")?, NANO)
     } else if has & 1 << 8 != 0 {
@@ -236,12 +231,10 @@ fn header(items: &mut Items<'_>, has: u16) -> Result<Header, Malformed> {
     let [a0, a1, _, _, f0, f1, f2, f3, d0, d1, d2, d3] = bytes;
     let duration = u32::from_be_bytes([d0, d1, d2, d3]);
     let metres = f64::from(duration) / per_second * HALF_C_MPS;
-    Ok(Header {
-        angle: u16::from_be_bytes([a0, a1]),
-        first: u32::from_be_bytes([f0, f1, f2, f3]) as usize,
-        // A femtosecond is 0.15 um; depths are given in micrometres at the finest.
-        resolution_m: ((metres * 1e6).round() / 1e6) as f32,
-    })
+    let first = u32::from_be_bytes([f0, f1, f2, f3]) as usize;
+    // A femtosecond is 0.15 um; depths are given in micrometres at the finest.
+    let resolution_m = ((metres * 1e6).round() / 1e6) as f32;
+    Ok((u16::from_be_bytes([a0, a1]), first, resolution_m))
 }
 
 /// Takes the powers, without the padding of their blocks.

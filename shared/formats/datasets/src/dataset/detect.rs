@@ -236,7 +236,7 @@ fn evidence(image: &FirstImage) -> String {
     let of = |is_so: bool, words| if is_so { words } else { "" };
     let chirps = of(image.chirps_alternate(), ", chirps alternate");
     let unit = of(image.nanoseconds(), ", stamps in ns");
-    format!("{} range bins, {named}{chirps}{unit}.", image.bins())
+    format!("{} range bins, {named}{chirps}{unit}.", image.bins)
 }
 
 const NEVER: i32 = -100;
@@ -252,7 +252,7 @@ fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
     };
     let is_in_ns = format == Format::MulranOxfordForm;
     by_name
-        + 2 * i32::from(profile.bins == Some(image.bins()))
+        + 2 * i32::from(profile.bins == Some(image.bins))
         + 2 * i32::from(image.chirps_alternate() == profile.chirps)
         - 1
         - 3 * i32::from(image.nanoseconds() != is_in_ns)

@@ -12,12 +12,6 @@ use super::stamp;
 
 const MAX_NAMED: usize = 4;
 
-#[derive(Debug, Default)]
-pub(crate) struct ImageList {
-    pub(crate) files: Vec<PathBuf>,
-    pub(crate) note: Option<String>,
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum SeriesPosition {
     Time(i64),
@@ -38,8 +32,8 @@ impl SeriesPosition {
 /// are named by, otherwise by name.
 ///
 /// Left out are hidden files, copies of a numbered image, whatever is named otherwise than at least
-/// half of the images, and a second file of the same number.
-pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
+/// half of the images, and a second file of the same number. The second value is a sentence on them.
+pub(crate) fn list(folder: &Path) -> Result<(Vec<PathBuf>, Option<String>), OpenError> {
     let io_error = |source| OpenError::io(folder, source);
     let mut names: Vec<OsString> = Vec::new();
     for entry in fs::read_dir(folder).map_err(io_error)? {
@@ -47,10 +41,8 @@ pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
     }
     let (names, mut others) = series(names);
     others.sort_unstable();
-    Ok(ImageList {
-        files: names.iter().map(|name| folder.join(name)).collect(),
-        note: note(&others, "not of the series by name"),
-    })
+    let files = names.iter().map(|name| folder.join(name)).collect();
+    Ok((files, note(&others, "not of the series by name")))
 }
 
 pub(crate) fn note(left_out: &[OsString], because: &str) -> Option<String> {

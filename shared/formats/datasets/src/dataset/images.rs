@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{OpenError, ReadError};
 use super::format::Format;
-use super::image_list::{self, ImageList, file_number};
+use super::image_list::{self, file_number};
 use super::image_size::ImageSize;
 use super::image_source::ImageSource;
 use super::png_image::{self, ImageReader};
@@ -30,7 +30,7 @@ pub(crate) struct Images {
 impl Images {
     /// Lists `folder`, and returns its images with sentences on the omitted ones.
     pub(crate) fn open(folder: &Path) -> Result<(Self, Vec<String>), OpenError> {
-        let ImageList { files, note } = image_list::list(folder)?;
+        let (files, note) = image_list::list(folder)?;
         Ok((Self::listed(folder, files)?, note.into_iter().collect()))
     }
 

@@ -56,10 +56,10 @@ impl NavtechScans {
         let mut first_image = FirstImage::read(&mut images)?;
         let order = |image| row_order::order(&mut images, image);
         let mut starts_ns = None;
-        if let Some(order) = first_image.as_ref().and_then(order) {
+        if let Some((starts, more)) = first_image.as_ref().and_then(order) {
             first_image = FirstImage::read(&mut images)?;
-            starts_ns = Some(order.starts_ns);
-            notes.extend(order.notes);
+            starts_ns = Some(starts);
+            notes.extend(more);
         }
         let named_by = first_image.as_ref().and_then(FirstImage::named_by);
         let meaning = match starts_ns {
@@ -122,8 +122,8 @@ impl NavtechScans {
         let turn = |index| {
             let decoded = self.images.decode(index, rows.clone(), &mut pixels);
             let rows: Vec<_> = navtech_png::rows(&pixels, decoded.ok()?).collect();
-            let counts = rows.iter().map(|row| row.count).collect();
-            Some(EncoderTurn::new(counts, |row| {
+            let counts: Vec<u16> = rows.iter().map(|row| row.count).collect();
+            Some(EncoderTurn::new(&counts, |row| {
                 stamp::to_ns(rows.get(row)?.stamp)
             }))
         };

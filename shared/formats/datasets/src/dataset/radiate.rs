@@ -67,26 +67,17 @@ fn read_list(list: &Path) -> Result<String, OpenError> {
 /// A frame number and a time of receipt, ns.
 type Receipt = (i64, i64);
 
-#[derive(Debug, PartialEq)]
-struct Segment {
-    first: i64,
-    receipts: Vec<Receipt>,
-}
-
 /// Divides the frames where the time between two of them contradicts their numbers, as after a
 /// pause or when the clock was set. A single time that is off is left out.
-fn segments(received: &[Receipt]) -> Vec<Segment> {
-    let mut segments: Vec<Segment> = Vec::new();
+fn segments(received: &[Receipt]) -> Vec<Vec<Receipt>> {
+    let mut segments: Vec<Vec<Receipt>> = Vec::new();
     for (index, receipt) in received.iter().enumerate() {
         let next = received.get(index + 1);
         let open = segments.last_mut();
-        match open.and_then(|segment| Some((*segment.receipts.last()?, segment))) {
-            Some((last, segment)) if agree(last, *receipt) => segment.receipts.push(*receipt),
+        match open.and_then(|segment| Some((*segment.last()?, segment))) {
+            Some((last, segment)) if agree(last, *receipt) => segment.push(*receipt),
             Some((last, _)) if next.is_some_and(|next| agree(last, *next)) => {}
-            _ => segments.push(Segment {
-                first: receipt.0,
-                receipts: vec![*receipt],
-            }),
+            _ => segments.push(vec![*receipt]),
         }
     }
     segments
@@ -110,7 +101,7 @@ fn add_turns(
     let segments = segments(&received);
     let mut used: BTreeSet<i64> = BTreeSet::new();
     let (mut clocks, mut early) = (Vec::new(), Vec::new());
-    for Segment { first, receipts } in &segments {
+    for receipts in &segments {
         let Some((clock, ignored)) = SensorClock::below_most(receipts, PERIOD_NS) else {
             continue;
         };
@@ -118,7 +109,7 @@ fn add_turns(
         used.extend(others.map(|receipt| receipt.0));
         let by_s = |receipt: Receipt| (receipt.0, -clock.after_ns(receipt) * 1e-9);
         early.extend(ignored.into_iter().map(by_s));
-        clocks.push((*first, clock));
+        clocks.push((receipts[0].0, clock));
     }
     let turn = |&(frame, logged_ns): &Receipt| {
         let later = clocks.partition_point(|(first, _)| *first <= frame);
@@ -257,11 +248,11 @@ mod tests {
             let [segment] = &segments(&frames)[..] else {
                 panic!("{off_ns}");
             };
-            assert_eq!(segment.receipts.len(), 19);
+            assert_eq!(segment.len(), 19);
         }
         let mut stalled = received(0..20, 0);
         stalled[7].1 += 1_400_000_000;
-        assert_eq!(segments(&stalled)[0].receipts.len(), 20);
+        assert_eq!(segments(&stalled)[0].len(), 20);
     }
 
     #[test]
@@ -269,7 +260,7 @@ mod tests {
         for pause_ns in [-3_600, 3_600].map(|s| s * SECOND_NS) {
             let frames = [received(0..10, 0), received(10..20, pause_ns)].concat();
             let found = segments(&frames);
-            let sizes: Vec<_> = found.iter().map(|s| (s.first, s.receipts.len())).collect();
+            let sizes: Vec<_> = found.iter().map(|s| (s[0].0, s.len())).collect();
             assert_eq!(sizes, [(0, 10), (10, 10)]);
         }
     }

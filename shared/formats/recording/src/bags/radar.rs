@@ -144,8 +144,8 @@ impl Survey {
         }
         let unit_ns = unit_ns.unwrap_or(1);
         let turn = |rows: &&[RowShown]| {
-            let counts = rows.iter().map(|(count, _)| *count).collect();
-            EncoderTurn::new(counts, |row| rows.get(row)?.1.checked_mul(unit_ns))
+            let counts: Vec<u16> = rows.iter().map(|(count, _)| *count).collect();
+            EncoderTurn::new(&counts, |row| rows.get(row)?.1.checked_mul(unit_ns))
         };
         let turns: Vec<EncoderTurn> = whole.iter().map(turn).collect();
         // The last step of a turn may differ.
