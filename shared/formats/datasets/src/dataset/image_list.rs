@@ -32,7 +32,7 @@ impl SeriesPosition {
 /// are named by, otherwise by name.
 ///
 /// Left out are hidden files, copies of a numbered image, whatever is named otherwise than at least
-/// half of the images, and a second file of the same number. The second value is a sentence on them.
+/// half of the images, and a second file of the same number: a sentence names them.
 pub(crate) fn list(folder: &Path) -> Result<(Vec<PathBuf>, Option<String>), OpenError> {
     let io_error = |source| OpenError::io(folder, source);
     let mut names: Vec<OsString> = Vec::new();
