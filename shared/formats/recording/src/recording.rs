@@ -63,8 +63,8 @@ struct Place {
 type Places = Vec<(String, Vec<Entry>, Span)>;
 
 impl Recording {
-    /// Opens the files of a recording, at least one, in order. Files of a different recording than the first are
-    /// left out.
+    /// Opens the files of a recording, at least one, in order. Files of a different recording than
+    /// the first are left out.
     pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
         let mut recording = Self::default();
         for path in paths {
