@@ -5,11 +5,17 @@
 //! cargo run --release -p gyre-odometry --example own_dataset -- FOLDER > trajectory.tum
 //! ```
 
-use std::{env, error::Error, f32::consts::TAU, fs, io, path::Path};
+use std::{
+    env,
+    error::Error,
+    f32::consts::TAU,
+    fs, io,
+    path::{Path, PathBuf},
+};
 
 use gyre_datasets::{
-    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, InspectedLogs,
-    Properties, ReadError, inspect_dataset, turn_ns, write_tum,
+    DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, InspectedLogs, Properties,
+    ReadError, inspect_dataset, turn_ns, write_tum,
 };
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, ScanSlot, Sense, SweepGeometry, Trajectory, scan::flag};
@@ -23,7 +29,7 @@ const BIN_M: f32 = 100.0 / 576.0;
 /// A folder of sweeps.
 pub(crate) struct RawSweeps {
     properties: Properties,
-    files: FileList,
+    files: Vec<PathBuf>,
     stamp_ns: Vec<i64>,
 }
 
@@ -46,7 +52,7 @@ impl RawSweeps {
                 period_ns: turn_ns(stamp_ns.iter().copied()).unwrap_or(DEFAULT_TURN_NS),
                 ..Properties::of(Format::Other, files.len(), SIZE, meaning)
             },
-            files: files.into_iter().collect(),
+            files,
             stamp_ns,
         })
     }
@@ -57,7 +63,7 @@ impl Dataset for RawSweeps {
         &self.properties
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.files
     }
 

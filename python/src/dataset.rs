@@ -92,11 +92,8 @@ impl Dataset {
     /// files.
     #[getter]
     fn files(&self, py: Python<'_>) -> PyResult<Vec<PathBuf>> {
-        self.dataset.with(py, |dataset| {
-            let files = dataset.scans.files();
-            let paths = (0..files.len()).filter_map(|index| files.get(index));
-            paths.map(ToOwned::to_owned).collect()
-        })
+        self.dataset
+            .with(py, |dataset| dataset.scans.files().to_vec())
     }
 
     /// The time of each scan as far as it is known without decoding it, int64 (scans,), ns; -1

@@ -4,7 +4,7 @@
 use std::{error::Error, path::Path};
 
 use gyre_datasets::{
-    Dataset, Fingerprint, GnssLog, GyroLog, OpenError, ScanSamples, WheelLog, check_first_scan,
+    Dataset, Fingerprint, GnssLog, OpenError, SampleLog, ScanSamples, check_first_scan,
 };
 use gyre_run::PlayedFrom;
 use gyre_samples::{DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
@@ -98,7 +98,7 @@ pub fn simulated_samples(
                     "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\"",
                 );
             };
-            ScanSamples::of_gyro(&GyroLog::of(samples, path)?, gyro, dataset)?
+            ScanSamples::of_gyro(&SampleLog::of_gyro(samples, path)?, gyro, dataset)?
         }
         _ => ScanSamples::open(gyro, &WheelsConfig::default(), Path::new(""), dataset)?,
     };
@@ -109,7 +109,7 @@ pub fn simulated_samples(
                     "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\"",
                 );
             };
-            ScanSamples::of_wheels(&WheelLog::of(samples, path)?, wheels, dataset)?
+            ScanSamples::of_wheels(&SampleLog::of_wheels(samples, path)?, wheels, dataset)?
         }
         _ => ScanSamples::open(&GyroConfig::default(), wheels, Path::new(""), dataset)?,
     };

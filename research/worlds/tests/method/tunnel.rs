@@ -3,7 +3,7 @@
 
 use std::{fmt::Write as _, path::Path};
 
-use gyre_datasets::{Dataset, GyroLog, ScanSamples, WheelLog, open_source};
+use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
 use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
@@ -91,12 +91,12 @@ fn with(
     let (mut samples, path) = (ScanSamples::None, Path::new("simulation"));
     if gyro {
         config.gyro.kind = GyroKind::Auto;
-        let log = GyroLog::of(drive.gyro_samples().unwrap(), path).unwrap();
+        let log = SampleLog::of_gyro(drive.gyro_samples().unwrap(), path).unwrap();
         samples = ScanSamples::of_gyro(&log, &config.gyro, dataset).unwrap();
     }
     if wheels {
         config.wheels.kind = WheelsKind::Auto;
-        let log = WheelLog::of(drive.wheel_samples().unwrap(), path).unwrap();
+        let log = SampleLog::of_wheels(drive.wheel_samples().unwrap(), path).unwrap();
         samples = samples.and(ScanSamples::of_wheels(&log, &config.wheels, dataset).unwrap());
     }
     (config, samples)

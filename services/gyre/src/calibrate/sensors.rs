@@ -7,7 +7,7 @@ use gyre_calibration::{
     ClockError, Drive, GyroCalibration, WheelCalibration, calibrate_gyro, calibrate_wheels,
 };
 use gyre_configuration::Configuration;
-use gyre_datasets::{GyroLog, WheelLog};
+use gyre_datasets::SampleLog;
 use gyre_samples::{GyroConfig, GyroKind, WheelsConfig};
 use gyre_terminal::{Failure, print};
 
@@ -108,18 +108,18 @@ macro_rules! sensor {
 
 sensor! {
     Gyro: "gyro, log", "gyro is", gyro, calibrate_gyro,
-    GyroLog, GyroConfig, GyroCalibration,
-    beside: |folder: &Path| GyroLog::find(folder).ok(),
-    read: |file: &Path, _: &GyroConfig| GyroLog::read(file),
+    SampleLog, GyroConfig, GyroCalibration,
+    beside: |folder: &Path| SampleLog::find_gyro(folder).ok(),
+    read: |file: &Path, _: &GyroConfig| SampleLog::read_gyro(file),
     mean: GyroCalibration::mean,
     toml: |found: &GyroCalibration, file: Option<&Path>, _: &GyroConfig| found.toml(file)
 }
 
 sensor! {
     Wheels: "wheels, log", "wheels are", wheels, calibrate_wheels,
-    WheelLog, WheelsConfig, WheelCalibration,
-    beside: |folder: &Path| WheelLog::find(folder).ok(),
-    read: |file: &Path, config: &WheelsConfig| WheelLog::read(file, config.m_per_tick),
+    SampleLog, WheelsConfig, WheelCalibration,
+    beside: |folder: &Path| SampleLog::find_wheels(folder).ok(),
+    read: |file: &Path, config: &WheelsConfig| SampleLog::read_wheels(file, config.m_per_tick),
     mean: |one: &WheelCalibration, others: &[WheelCalibration]| -> Result<_, Failure> {
         Ok(one.mean(others))
     },

@@ -54,7 +54,9 @@ impl ScanAssembly {
             let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
             let is_start = self.assembler.is_first(azimuth.encoder);
             turns.note(LastScan { stamp_ns, at_ns }, fraction.fract(), is_start);
-            complete = self.assembler.add(&azimuth, stamp_ns, header.slot(bytes));
+            complete = self
+                .assembler
+                .add(&azimuth, stamp_ns, &mut header.slot(bytes));
             if complete.is_some() {
                 break;
             }
@@ -129,7 +131,7 @@ impl ScanAssembly {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_colossus::{ClockFormat, Powers};
+    use gyre_colossus::ClockFormat;
 
     use super::*;
 
@@ -171,7 +173,7 @@ mod tests {
                 encoder: row * 14,
                 seconds,
                 split_seconds,
-                powers: Powers::Eight(&[7; 16]),
+                powers: &[7; 16],
             };
             let (header, bytes) = (&mut self.header, &mut self.bytes);
             let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);

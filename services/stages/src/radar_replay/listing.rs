@@ -4,12 +4,15 @@
 //! same numbers, even if files came or went meanwhile.
 
 use std::{
+    ffi::OsStr,
     fs,
     io::{self, ErrorKind},
-    path::Path,
+    iter,
+    os::unix::ffi::OsStrExt,
+    path::{Path, PathBuf},
 };
 
-use gyre_datasets::{Dataset, FileList, Format};
+use gyre_datasets::{Dataset, Format};
 
 /// The file in the run's root: the name of the format, then the paths, each with a NUL behind it.
 const FILE: &str = "recording.list";
@@ -17,36 +20,37 @@ const FILE: &str = "recording.list";
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listing {
     pub format: Format,
-    pub files: FileList,
+    pub files: Vec<PathBuf>,
 }
 
 impl Listing {
     pub fn of(dataset: &dyn Dataset) -> Self {
         Self {
             format: dataset.format(),
-            files: dataset.files().clone(),
+            files: dataset.files().to_vec(),
         }
     }
 
     pub fn write(&self, root: &Path) -> io::Result<()> {
-        let format = self.format.name().as_bytes();
-        fs::write(root.join(FILE), [format, self.files.as_bytes()].join(&0))
+        let files = self.files.iter().map(|file| file.as_os_str().as_bytes());
+        let names = iter::once(self.format.name().as_bytes()).chain(files);
+        let bytes: Vec<u8> = names.flat_map(|name| [name, b"\0"].concat()).collect();
+        fs::write(root.join(FILE), bytes)
     }
 
     pub fn read(root: &Path) -> io::Result<Option<Self>> {
-        let mut bytes = match fs::read(root.join(FILE)) {
+        let bytes = match fs::read(root.join(FILE)) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             bytes => bytes?,
         };
-        let end = bytes.iter().position(|byte| *byte == 0);
-        let files = bytes.split_off(end.map_or(bytes.len(), |end| end + 1));
-        let name = bytes
-            .strip_suffix(&[0])
-            .and_then(|name| str::from_utf8(name).ok());
-        let format = name.and_then(Format::by_name);
+        // Bytes behind the last NUL are ignored.
+        let names = bytes.split_inclusive(|byte| *byte == 0);
+        let mut names = names.filter_map(|name| name.strip_suffix(&[0]));
+        let format = names.next().and_then(|name| str::from_utf8(name).ok());
+        let format = format.and_then(Format::by_name);
         Ok(Some(Self {
             format: format.ok_or(ErrorKind::InvalidData)?,
-            files: FileList::from_bytes(files),
+            files: names.map(|name| OsStr::from_bytes(name).into()).collect(),
         }))
     }
 }
@@ -54,8 +58,6 @@ impl Listing {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::path::PathBuf;
-
     use super::*;
 
     #[test]
@@ -68,10 +70,7 @@ mod tests {
         {
             let listing = Listing {
                 format,
-                files: ["a/1.png", "a/2.png"]
-                    .map(PathBuf::from)
-                    .into_iter()
-                    .collect(),
+                files: ["a/1.png", "a/2.png"].map(PathBuf::from).to_vec(),
             };
             listing.write(root.path()).unwrap();
             assert_eq!(Listing::read(root.path()).unwrap(), Some(listing));

@@ -41,6 +41,8 @@ const NANO: f64 = 1e9;
 const SPECIAL_BYTES: usize = 25;
 /// The item of cells, in the order of the specification, and the bytes of one block of it.
 const BLOCK_BYTES: [usize; 3] = [4, 64, 256];
+/// The resolution of a cell of 8 bits.
+const EIGHT_BITS: u8 = 4;
 /// Version and ids of Navtech's own messages by UDP, which carry no powers.
 const COLOSSUS_UDP_VERSION: u8 = 2;
 const COLOSSUS_UDP_IDS: std::ops::RangeInclusive<u8> = 10..=50;
@@ -53,8 +55,6 @@ struct Video<'a> {
     angle: u16,
     resolution_m: f32,
     first: usize,
-    /// Bytes per bin, 1 or 2.
-    bin_bytes: usize,
     powers: &'a [u8],
     special: Special,
 }
@@ -166,8 +166,8 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
     if has & 1 << 10 != 0 {
         items.blocks(1, "I240/030")?;
     }
-    let header = header(&mut items, has)?;
-    let (bin_bytes, powers) = cells(&mut items, has)?;
+    let (angle, first, resolution_m) = header(&mut items, has)?;
+    let powers = cells(&mut items, has)?;
     if has & 1 << 2 != 0 {
         let _time_of_day: [u8; 3] = items.take("I240/140")?;
     }
@@ -178,17 +178,16 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
         return Err(missing("SP"));
     }
     let special = special(&mut items)?;
-    let (first, bins) = (header.first, usize::from(special.bins));
-    let cells = powers.len() / bin_bytes;
+    let bins = usize::from(special.bins);
+    let cells = powers.len();
     if first.saturating_add(cells) > bins {
-        return Err(bad_cells([cells, first, powers.len(), bins]));
+        return Err(bad_cells([cells, first, cells, bins]));
     }
     Ok(Some(Video {
         number,
-        angle: header.angle,
-        resolution_m: header.resolution_m,
+        angle,
+        resolution_m,
         first,
-        bin_bytes,
         powers,
         special,
     }))
@@ -220,13 +219,8 @@ fn features(items: &mut Items<'_>) -> Result<u16, Malformed> {
     Ok(u16::from(first >> 1) << 7 | u16::from(second >> 1))
 }
 
-struct Header {
-    angle: u16,
-    first: usize,
-    resolution_m: f32,
-}
-
-fn header(items: &mut Items<'_>, has: u16) -> Result<Header, Malformed> {
+/// Takes the angle, the first bin and the depth of a bin, m.
+fn header(items: &mut Items<'_>, has: u16) -> Result<(u16, usize, f32), Malformed> {
     let (bytes, per_second): ([u8; 12], f64) = if has & 1 << 9 != 0 {
         (items.take("I240/040")?, NANO)
     } else if has & 1 << 8 != 0 {
@@ -237,30 +231,24 @@ fn header(items: &mut Items<'_>, has: u16) -> Result<Header, Malformed> {
     let [a0, a1, _, _, f0, f1, f2, f3, d0, d1, d2, d3] = bytes;
     let duration = u32::from_be_bytes([d0, d1, d2, d3]);
     let metres = f64::from(duration) / per_second * HALF_C_MPS;
-    Ok(Header {
-        angle: u16::from_be_bytes([a0, a1]),
-        first: u32::from_be_bytes([f0, f1, f2, f3]) as usize,
-        // A femtosecond is 0.15 um; depths are given in micrometres at the finest.
-        resolution_m: ((metres * 1e6).round() / 1e6) as f32,
-    })
+    let first = u32::from_be_bytes([f0, f1, f2, f3]) as usize;
+    // A femtosecond is 0.15 um; depths are given in micrometres at the finest.
+    let resolution_m = ((metres * 1e6).round() / 1e6) as f32;
+    Ok((u16::from_be_bytes([a0, a1]), first, resolution_m))
 }
 
 /// Takes the powers, without the padding of their blocks.
-fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malformed> {
+fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<&'a [u8], Malformed> {
     if has & 1 << 7 == 0 {
         return Err(missing("I240/048"));
     }
     let [compression, resolution] = items.take("I240/048")?;
     let compressed = compression & 0x80 != 0;
-    let bin_bytes = match (compressed, resolution) {
-        (false, 4) => 1,
-        (false, 5) => 2,
-        _ => {
-            return Err(Malformed::new(format!(
-                "a message has powers of resolution {resolution} (4: 8 bits, 5: 16 bits), compressed: {compressed}"
-            )));
-        }
-    };
+    if compressed || resolution != EIGHT_BITS {
+        return Err(Malformed::new(format!(
+            "a message has powers of resolution {resolution}, compressed: {compressed}, expected {EIGHT_BITS} (8 bits), not compressed"
+        )));
+    }
     if has & 1 << 6 == 0 {
         return Err(missing("I240/049"));
     }
@@ -273,9 +261,8 @@ fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malfo
             blocks = items.blocks(block, "I240/050")?;
         }
     }
-    let powers = blocks.get(..bytes).filter(|_| bytes == cells * bin_bytes);
-    let powers = powers.ok_or_else(|| bad_cells([cells, 0, bytes, MAX_PAYLOAD_BYTES]))?;
-    Ok((bin_bytes, powers))
+    let powers = blocks.get(..bytes).filter(|_| bytes == cells);
+    powers.ok_or_else(|| bad_cells([cells, 0, bytes, MAX_PAYLOAD_BYTES]))
 }
 
 fn special(items: &mut Items<'_>) -> Result<Special, Malformed> {

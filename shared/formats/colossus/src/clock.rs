@@ -127,9 +127,7 @@ impl fmt::Display for FoundClock {
 /// azimuth is held back until the second.
 #[derive(Clone, Debug)]
 pub struct RadarClock {
-    encoder_size: i32,
-    step: f64,
-    ns_per_count: f64,
+    radar: Configuration,
     found: Option<FoundClock>,
     /// Host's time minus radar's time; 0 if the radar has the time.
     offset_ns: i64,
@@ -139,9 +137,7 @@ pub struct RadarClock {
 impl RadarClock {
     pub fn new(configuration: &Configuration) -> Self {
         Self {
-            encoder_size: i32::from(configuration.encoder_size.max(1)),
-            step: configuration.step(),
-            ns_per_count: configuration.ns_per_count(),
+            radar: *configuration,
             found: None,
             offset_ns: 0,
             held: Vec::new(),
@@ -228,8 +224,9 @@ impl RadarClock {
         arrived_ns: i64,
     ) -> Option<ClockFormat> {
         let counts = i32::from(later.encoder) - i32::from(earlier.encoder);
-        let counts = f64::from(counts.rem_euclid(self.encoder_size)).max(self.step);
-        let expected_ns = counts * self.ns_per_count;
+        let turn = i32::from(self.radar.encoder_size.max(1));
+        let counts = f64::from(counts.rem_euclid(turn)).max(self.radar.step());
+        let expected_ns = counts * self.radar.ns_per_count();
         let orders = [ByteOrder::Little, ByteOrder::Big];
         let units = [SplitUnit::Nanoseconds, SplitUnit::Microseconds];
         let formats = orders.map(|order| units.map(|unit| ClockFormat { order, unit }));

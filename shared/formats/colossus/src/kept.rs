@@ -1,6 +1,6 @@
 //! An azimuth that outlives the buffer it was received in.
 
-use crate::message::{Azimuth, Powers};
+use crate::message::Azimuth;
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KeptAzimuth {
@@ -8,7 +8,6 @@ pub(crate) struct KeptAzimuth {
     encoder: u16,
     seconds: [u8; 4],
     split_seconds: [u8; 4],
-    sixteen: bool,
     powers: Vec<u8>,
 }
 
@@ -18,9 +17,8 @@ impl KeptAzimuth {
         self.encoder = azimuth.encoder;
         self.seconds = azimuth.seconds;
         self.split_seconds = azimuth.split_seconds;
-        self.sixteen = matches!(azimuth.powers, Powers::Sixteen(_));
         self.powers.clear();
-        self.powers.extend_from_slice(azimuth.powers.bytes());
+        self.powers.extend_from_slice(azimuth.powers);
     }
 
     pub(crate) fn azimuth(&self) -> Azimuth<'_> {
@@ -29,10 +27,7 @@ impl KeptAzimuth {
             encoder: self.encoder,
             seconds: self.seconds,
             split_seconds: self.split_seconds,
-            powers: match self.sixteen {
-                true => Powers::Sixteen(&self.powers),
-                false => Powers::Eight(&self.powers),
-            },
+            powers: &self.powers,
         }
     }
 }

@@ -203,18 +203,12 @@ fn find(bytes: &[u8]) -> Option<usize> {
         if window == SIGNATURE {
             return Some(at);
         }
-        at += match window[SIGNATURE.len() - 1] {
-            0xfe => 1,
-            0x7f => 2,
-            0x3f => 4,
-            0x1f => 6,
-            0x0f => 8,
-            0x07 => 10,
-            0x03 => 12,
-            0x01 => 14,
-            0x00 => 15,
-            _ => 16,
-        };
+        let (last, before) = (
+            window[SIGNATURE.len() - 1],
+            &SIGNATURE[..SIGNATURE.len() - 1],
+        );
+        let place = before.iter().rposition(|byte| *byte == last);
+        at += place.map_or(SIGNATURE.len(), |place| before.len() - place);
     }
     None
 }

@@ -2,7 +2,6 @@
 //! bit.
 
 mod counters;
-mod powers;
 mod rows;
 mod seam;
 
@@ -70,7 +69,9 @@ impl SweepAssembler {
         };
         checked.check()?;
         Ok(Self {
-            grid: Grid::new(configuration),
+            grid: Grid {
+                radar: *configuration,
+            },
             rows: RowWriter::new(configuration),
             constants,
             range_resolution_m: resolution_m,
@@ -118,10 +119,9 @@ impl SweepAssembler {
         &mut self,
         azimuth: &Azimuth<'_>,
         stamp_ns: i64,
-        mut slot: ScanSlot<'_>,
+        slot: &mut ScanSlot<'_>,
     ) -> Option<Sweep> {
-        self.rows.assert_fits(&slot);
-        let slot = &mut slot;
+        self.rows.assert_fits(slot);
         self.write_kept(slot);
         let Some(encoder) = self.grid.encoder(azimuth.encoder) else {
             self.counters.invalid_azimuths += 1;

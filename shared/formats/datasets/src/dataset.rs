@@ -5,9 +5,7 @@ mod detect;
 mod eccentricity;
 mod encoder;
 mod error;
-mod file_list;
 mod first_image;
-mod foreign;
 mod format;
 mod image_list;
 mod image_size;
@@ -27,7 +25,10 @@ mod stale;
 pub(crate) mod stamp;
 mod transposed;
 
-use std::{ops::Range, path::Path};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
@@ -37,8 +38,6 @@ pub use detect::is_dataset;
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 pub use error::{OpenError, ReadError};
-pub use file_list::FileList;
-pub use foreign::foreign;
 pub use format::Format;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
@@ -142,11 +141,12 @@ pub trait Dataset: Send {
     }
 
     /// The files of the scans.
-    fn files(&self) -> &FileList;
+    fn files(&self) -> &[PathBuf];
 
     /// The file of a scan; an empty path past the end.
     fn file(&self, index: usize) -> &Path {
-        self.files().get(index).unwrap_or(Path::new(""))
+        let file = self.files().get(index);
+        file.map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it
@@ -158,7 +158,7 @@ pub trait Dataset: Send {
         self.nominal_stamp_ns(index)
     }
 
-    /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
+    /// Decodes a scan into `slot`, whose slices must be at least as long as [`Dataset::limits`].
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
     /// Reads the samples of another sensor that the recording itself has, on the topic of this
@@ -187,25 +187,6 @@ pub trait Dataset: Send {
     }
 }
 
-/// Checks that a slot is as large as the limits of a dataset.
-pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-    for (what, needed, actual) in [
-        ("bytes", limits.bytes, slot.bytes.len()),
-        ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
-        ("stamps", limits.azimuths, slot.stamp_ns.len()),
-        ("flags", limits.azimuths, slot.flags.len()),
-    ] {
-        if actual < needed {
-            return Err(ReadError::SlotTooSmall {
-                what,
-                needed,
-                actual,
-            });
-        }
-    }
-    Ok(())
-}
-
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
 /// itself.
 ///
@@ -228,7 +209,7 @@ pub fn reopen(
     root: &Path,
     options: &DatasetOptions,
     format: Format,
-    files: FileList,
+    files: Vec<PathBuf>,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_found(detect::Found::listed(root, format, files)?, options)

@@ -51,31 +51,26 @@ impl Fingerprint {
     /// does not.
     pub fn difference(&self, now: &Self) -> Option<String> {
         let stamp = |ns: Option<i64>| ns.map_or("unknown".to_owned(), |ns| ns.to_string());
-        let first = [self, now].map(|it| stamp(it.first_stamp_ns));
-        let last = [self, now].map(|it| stamp(it.last_stamp_ns));
-        let texts = |value: fn(&Self) -> String| [self, now].map(value);
-        // The text before the earlier value, and between the earlier and the present value.
-        for ([was, now], [before, between]) in [
-            (
-                texts(|it| it.format.to_string()),
-                ["its format was ", " and is now "],
-            ),
-            (
-                texts(|it| it.scans.to_string()),
-                ["it had ", " scans and now has "],
-            ),
-            (first, ["the time of its first scan was ", " and is now "]),
-            (last, ["the time of its last scan was ", " and is now "]),
-            (
-                texts(|it| it.bytes.to_string()),
-                ["its images had ", " bytes and now have "],
-            ),
-        ] {
-            if was != now {
-                return Some(format!("{before}{was}{between}{now}"));
-            }
-        }
-        (self.sha256 != now.sha256)
-            .then(|| "the names, sizes or times of some of its scans are others".to_owned())
+        let values = |of: &Self| {
+            [
+                of.format.to_string(),
+                of.scans.to_string(),
+                stamp(of.first_stamp_ns),
+                stamp(of.last_stamp_ns),
+                of.bytes.to_string(),
+                of.sha256.clone(),
+            ]
+        };
+        let (was, is) = (values(self), values(now));
+        let other = (0..was.len()).find(|k| was[*k] != is[*k])?;
+        let (was, is) = (&was[other], &is[other]);
+        Some(match other {
+            0 => format!("its format was {was} and is now {is}"),
+            1 => format!("it had {was} scans and now has {is}"),
+            2 => format!("the time of its first scan was {was} and is now {is}"),
+            3 => format!("the time of its last scan was {was} and is now {is}"),
+            4 => format!("its images had {was} bytes and now have {is}"),
+            _ => "the names, sizes or times of some of its scans are others".to_owned(),
+        })
     }
 }

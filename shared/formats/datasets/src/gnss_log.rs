@@ -83,7 +83,7 @@ impl GnssLog {
             sigma_m: RawFix::sigma_of([first[0], second[1]]),
             ..RawFix::default()
         };
-        Ok((gps_imu_twist::read(path, OF, [0, 1, 2], fix)?, false))
+        Ok((gps_imu_twist::read(path, [0, 1, 2], fix)?, false))
     }
 
     /// Returns all fixes of a log as one table.
@@ -167,26 +167,25 @@ impl GnssLog {
     }
 
     fn usable(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> Result<Self, LogError> {
-        match Self::examined(raw, is_plane, path) {
-            (log, None) => Ok(log),
-            (_, Some(error)) => Err(error),
+        let log = Self::examined(raw, is_plane, path);
+        match log.unusable {
+            Some(reason) => Err(LogError::Unusable(reason)),
+            None => Ok(log),
         }
     }
 
-    /// Examines the fixes. Returns the log, or the reason if all fixes are unusable.
-    fn examined(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> (Self, Option<LogError>) {
+    /// Examines the fixes; a log of which none can be used has the reason.
+    fn examined(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> Self {
         let all = raw.count();
         let (fixes, plane, faults) = faults::examine(raw, is_plane);
-        let unusable = || LogError::unusable(OF, path, faults.without_usable(all));
-        let error = fixes.is_empty().then(unusable);
-        let log = Self {
+        let why = || LogError::unusable(OF, path, faults.without_usable(all)).to_string();
+        Self {
+            unusable: fixes.is_empty().then(why),
             fixes,
             plane,
             faults,
             path: path.to_owned(),
             topic: None,
-            unusable: None,
-        };
-        (log, error)
+        }
     }
 }

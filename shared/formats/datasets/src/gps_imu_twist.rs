@@ -4,7 +4,7 @@
 //! A file has 18 lines of numbers: latitude, longitude and altitude; their covariance, m² along
 //! east, north and up (3); quaternion; angular rates; accelerations; covariances (9); twist (2).
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use gyre_storage as storage;
 
@@ -18,18 +18,10 @@ const UNREADABLE: &str = "the file of this number is missing, or has another for
 /// 1970, and of these lines, counted from 0, each of three numbers.
 pub(crate) fn read<T, const N: usize>(
     folder: &Path,
-    of: &'static str,
     lines: [usize; N],
     entry: impl Fn(i64, [[f64; 3]; N]) -> T,
 ) -> Result<Raw<T>, LogError> {
     let list = folder.with_extension("txt");
-    if !list.is_file() {
-        let list = list.display();
-        let reason = format!(
-            "a folder as RADIATE's GPS_IMU_Twist needs the list of the times of its files beside it, {list}"
-        );
-        return Err(LogError::unknown(of, folder, reason));
-    }
     let mut raw = Raw::of(Vec::new());
     for (number, stamp_ns) in frame_stamps(&list)? {
         match numbers(&folder.join(format!("{number:06}.txt")), lines) {
@@ -39,11 +31,6 @@ pub(crate) fn read<T, const N: usize>(
                 raw.unreadable.add(1, number, || UNREADABLE.to_owned());
             }
         }
-    }
-    let is_empty = raw.entries.is_empty();
-    if is_empty && fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none()) {
-        let reason = "the folder is empty: unpack the recording again";
-        return Err(LogError::unknown(of, folder, reason));
     }
     Ok(raw)
 }

@@ -30,6 +30,8 @@ const PLACES: [&str; 9] = [
     "gt.tum",
 ];
 
+const SEPARATORS: &str = "columns need spaces between them in TUM and KITTI, commas in the others, and numbers need decimal points";
+
 /// The largest file: a month of poses at 10 Hz has 2.3 GB.
 const MAX_BYTES: u64 = 4 << 30;
 
@@ -55,8 +57,8 @@ impl LineError {
 type Parse = fn(&str) -> Result<Trajectory, LineError>;
 
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
-/// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward):
-/// their plane of motion is found. Of a folder, its ground truth is read.
+/// REP-103. Sensors of TUM and KITTI files stay upright (z up or down): the poses are projected to
+/// the plane. Of a folder, its ground truth is read.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     let failed = |reason: String| {
         let path = path.display();
@@ -123,46 +125,17 @@ fn detect(text: &str) -> Result<Parse, String> {
     let (_, first) = lines(text).next().ok_or("it is empty")?;
     let commas = first.split(',').count();
     let words = first.split_whitespace().count();
-    check_separators(first, commas, words)?;
+    let columns = commas.max(words);
     match (commas, words) {
+        _ if first.contains(';') => Err(SEPARATORS.to_owned()),
         _ if first.contains("destination_timestamp") => Ok(oxford::parse),
         _ if boreas::TIMES.iter().any(|name| first.contains(name)) => Ok(boreas::parse),
-        (13, _) => Ok(mulran::parse),
+        (13, 1 | 13) => Ok(mulran::parse),
         (1, 8) => Ok(tum::parse),
         (1, 12 | 13) => Ok(kitti::parse),
-        _ => Err(format!("its first line has {} columns", commas.max(words))),
-    }
-}
-
-/// Rejects the output of spreadsheets in countries with decimal commas, and the column separators
-/// of other formats.
-fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), String> {
-    // With a fraction: a comma at the end of a word parts columns, as in `1, 2`.
-    let is_number = |word: &str| word.parse::<f64>().is_ok();
-    let is_decimal = |word: &str| {
-        let parts = word.split_once(',');
-        let has_digit = |fraction: &str| fraction.starts_with(|c: char| c.is_ascii_digit());
-        parts.is_some_and(|(whole, fraction)| whole.parse::<i64>().is_ok() && has_digit(fraction))
-            && is_number(&word.replace(',', "."))
-    };
-    let columns = |count| match count {
-        8 => "8 columns (TUM)",
-        _ => "columns (KITTI)",
-    };
-    match first.split(';').count() {
-        1 if matches!(words, 8 | 12 | 13) && first.split_whitespace().any(is_decimal) => Err(format!(
-            "the numbers in its {} have decimal commas, and need decimal points: `sed 's/,/./g'` makes them",
-            columns(words)
+        _ => Err(format!(
+            "its first line has {columns} columns: {SEPARATORS}"
         )),
-        1 if matches!(commas, 8 | 12) && first.split(',').all(|word| is_number(word.trim())) => {
-            Err(format!("its {} are parted by commas, and need spaces: `sed 's/,/ /g'` makes them", columns(commas)))
-        }
-        1 => Ok(()),
-        count @ (8 | 12) => Err(format!(
-            "its {} are parted by semicolons, and need spaces, and decimal points: `sed 's/,/./g; s/;/ /g'` makes them",
-            columns(count)
-        )),
-        _ => Err("its columns are parted by semicolons, and need commas, and decimal points: `sed 's/,/./g; s/;/,/g'` makes them".to_owned()),
     }
 }
 
@@ -237,13 +210,21 @@ fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> 
     })
 }
 
-fn check_increasing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
-    match stamps.last() {
-        Some(last) if next < *last => {
-            let back_s = (last - next) as f64 * 1e-9;
+/// Collects what rows have at their times, which must not run backwards.
+fn stamped<'a, T>(
+    rows: impl Iterator<Item = (usize, &'a str)>,
+    parse: impl Fn(usize, &str) -> Result<(i64, T), LineError>,
+) -> Result<(Vec<i64>, Vec<T>), LineError> {
+    let (mut stamps, mut values) = (Vec::<i64>::new(), Vec::new());
+    for (line, row) in rows {
+        let (stamp, value) = parse(line, row)?;
+        if let Some(last) = stamps.last().filter(|last| stamp < **last) {
+            let back_s = (last - stamp) as f64 * 1e-9;
             let reason = format!("time runs backwards by {back_s:.6} s");
-            Err(LineError::new(line, reason))
+            return Err(LineError::new(line, reason));
         }
-        _ => Ok(()),
+        stamps.push(stamp);
+        values.push(value);
     }
+    Ok((stamps, values))
 }

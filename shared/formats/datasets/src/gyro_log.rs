@@ -2,13 +2,11 @@
 
 mod columns;
 pub(crate) mod faults;
-mod jumps;
-mod track;
+pub(crate) mod jumps;
 
 use std::path::{Path, PathBuf};
 
 pub use faults::{LogFaults, LogGap};
-pub use track::SampleTrack;
 
 use gyre_samples::{Sample, SampleKind, UpAxis};
 
@@ -43,40 +41,32 @@ const PLACES: [&str; 12] = [
 const GRAVITY_MPS2: std::ops::RangeInclusive<f64> = 9.3..=10.3;
 const UPRIGHT: f64 = 0.9;
 
-/// The log of a gyro, in its own axes and on its own clock.
+/// The log of a gyro or of wheels, in its own axes and on its own clock.
 #[derive(Clone, Debug, Default)]
-pub struct GyroLog {
-    /// The samples in the order of their stamps, which all differ. Rates are in rad/s,
-    /// accelerations in m/s²: all zero where the log has none.
+pub struct SampleLog {
+    /// The samples in the order of their stamps, which all differ. Rates are in rad/s, speeds in
+    /// m/s, accelerations in m/s²: all zero where the log has none.
     pub samples: Vec<Sample>,
     pub faults: LogFaults,
     pub path: PathBuf,
 }
 
-impl GyroLog {
-    /// Reads a log. The first row, or the number of columns, determines the format.
-    pub fn read(path: &Path) -> Result<Self, LogError> {
+impl SampleLog {
+    /// Reads the log of a gyro. The first row, or the number of columns, determines the format.
+    pub fn read_gyro(path: &Path) -> Result<Self, LogError> {
         if path.is_dir() {
             // The lines of the angular rates and of the accelerations.
-            let raw = gps_imu_twist::read(path, OF, [5, 6], columns::sample)?;
-            return Self::examined(raw, false, path);
+            let raw = gps_imu_twist::read(path, [5, 6], columns::sample)?;
+            return faults::examine(raw, false, path, &faults::RATES);
         }
         let rows = logs::rows::<GyroColumns>(path, OF)?;
-        Self::examined(rows.raw, rows.columns.unit_is_assumed, path)
-    }
-
-    fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
-        let (samples, faults) = faults::examine(raw, unit_is_assumed, path, &faults::RATES)?;
-        Ok(Self {
-            samples,
-            faults,
-            path: path.to_owned(),
-        })
+        let unit_is_assumed = rows.columns.unit_is_assumed;
+        faults::examine(rows.raw, unit_is_assumed, path, &faults::RATES)
     }
 
     /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
     /// images.
-    pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
+    pub fn find_gyro(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES).map_err(|missing| {
             let mut in_truth = logs::roots(folder).map(|root| root.join(IN_TRUTH));
             match in_truth.find(|path| path.is_file()) {
@@ -117,8 +107,8 @@ impl GyroLog {
             .filter(|_| GRAVITY_MPS2.contains(&norm))
     }
 
-    /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
-        Self::examined(Raw::of(samples), false, path)
+    /// Takes the samples of a gyro in a bag or a simulation, which messages name by this path.
+    pub fn of_gyro(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
+        faults::examine(Raw::of(samples), false, path, &faults::RATES)
     }
 }

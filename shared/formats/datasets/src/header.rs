@@ -85,12 +85,6 @@ impl Header {
         names.find_map(|name| self.0.iter().position(|it| it == name))
     }
 
-    /// Returns the column of the first of these signs that there is.
-    pub fn sign(&self, signs: &[&'static Sign]) -> Option<(usize, &'static Sign)> {
-        let mut signs = signs.iter();
-        signs.find_map(|sign| Some((self.find(sign.names)?, *sign)))
-    }
-
     /// Returns the first column whose name `meaning` knows, with its meaning.
     pub fn first<T>(&self, meaning: impl Fn(&str) -> Option<T>) -> Option<(usize, T)> {
         let mut names = self.0.iter().enumerate();

@@ -18,11 +18,10 @@ mod table;
 mod wheel_log;
 
 pub use dataset::{
-    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, FileList,
-    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError,
-    check_capacity, correct_eccentricity, encoder_counts, foreign, frame_stamps, is_dataset,
-    middle_ns, open, open_resolved, open_source, parse_seconds, reopen, stamp_to_ns,
-    stored_options, turn_ns,
+    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, Format,
+    ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError,
+    correct_eccentricity, encoder_counts, frame_stamps, is_dataset, middle_ns, open, open_resolved,
+    open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use first_scan::check_first_scan;
@@ -30,9 +29,8 @@ pub use gnss_log::{GnssFaults, GnssLog, LoggedFix, ReceivedFixes};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
-pub use gyro_log::{GyroLog, LogFaults, LogGap, SampleTrack};
+pub use gyro_log::{LogFaults, LogGap, SampleLog};
 pub use inspect::{InspectedLogs, Report, inspect, inspect_dataset};
 pub use logs::LogError;
 pub use plain_words::{clipped, in_plain_words};
 pub use scan_samples::ScanSamples;
-pub use wheel_log::WheelLog;

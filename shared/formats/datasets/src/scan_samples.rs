@@ -7,17 +7,18 @@ use gyre_samples::{
 };
 
 use crate::{
-    LogError, WheelLog,
+    LogError, SampleLog,
     dataset::{Dataset, Format},
-    gyro_log::{GyroLog, LogFaults, SampleTrack},
+    gyro_log::{LogFaults, jumps},
 };
 
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
 #[derive(Debug)]
 pub enum ScanSamples {
     None,
+    /// Samples in the vehicle's axes on the radar's clock, in the order of [`Sample::order`].
     Log {
-        track: SampleTrack,
+        samples: Vec<Sample>,
         faults: Vec<String>,
     },
     Recorded(Vec<SampleKind>),
@@ -39,23 +40,25 @@ impl ScanSamples {
         let turns = match gyro.kind {
             GyroKind::None => None,
             GyroKind::Udp | GyroKind::Ros2 => return live(SampleKind::Gyro),
-            GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
+            GyroKind::Log => Some(SampleLog::read_gyro(
+                &gyro.file.clone().unwrap_or_default(),
+            )?),
             GyroKind::Auto => Some(
                 match dataset.logged(SampleKind::Gyro, gyro.topic.as_deref())? {
-                    Some(samples) => GyroLog::of(samples, folder)?,
-                    None => GyroLog::read(&GyroLog::find(folder)?)?,
+                    Some(samples) => SampleLog::of_gyro(samples, folder)?,
+                    None => SampleLog::read_gyro(&SampleLog::find_gyro(folder)?)?,
                 },
             ),
         };
-        let read = |file: &Path| WheelLog::read(file, wheels.m_per_tick);
+        let read = |file: &Path| SampleLog::read_wheels(file, wheels.m_per_tick);
         let speeds = match wheels.kind {
             WheelsKind::None => None,
             WheelsKind::Udp | WheelsKind::Ros2 => return live(SampleKind::Wheels),
             WheelsKind::Log => Some(read(&wheels.file.clone().unwrap_or_default())?),
             WheelsKind::Auto => Some(
                 match dataset.logged(SampleKind::Wheels, wheels.topic.as_deref())? {
-                    Some(samples) => WheelLog::of(samples, folder)?,
-                    None => read(&WheelLog::find(folder)?)?,
+                    Some(samples) => SampleLog::of_wheels(samples, folder)?,
+                    None => read(&SampleLog::find_wheels(folder)?)?,
                 },
             ),
         };
@@ -70,7 +73,7 @@ impl ScanSamples {
     }
 
     pub fn of_gyro(
-        log: &GyroLog,
+        log: &SampleLog,
         config: &GyroConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
@@ -78,45 +81,58 @@ impl ScanSamples {
             up: Some(log.up(config.up, dataset.format())?),
             ..config.clone()
         };
-        let track = SampleTrack::of(log.samples.iter().map(|it| config.on_radar(it)));
-        Self::of_track(track, (SampleKind::Gyro, &log.path), &log.faults, dataset)
+        let samples = log.samples.iter().map(|it| config.on_radar(it)).collect();
+        Self::of_samples(samples, (SampleKind::Gyro, &log.path), &log.faults, dataset)
     }
 
     pub fn of_wheels(
-        log: &WheelLog,
+        log: &SampleLog,
         config: &WheelsConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
-        let track = SampleTrack::of(log.samples.iter().map(|it| config.on_radar(it)));
-        Self::of_track(track, (SampleKind::Wheels, &log.path), &log.faults, dataset)
+        let samples = log.samples.iter().map(|it| config.on_radar(it)).collect();
+        Self::of_samples(
+            samples,
+            (SampleKind::Wheels, &log.path),
+            &log.faults,
+            dataset,
+        )
     }
 
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         match (self, other) {
             (
-                Self::Log { track, faults },
                 Self::Log {
-                    track: other,
+                    mut samples,
+                    mut faults,
+                },
+                Self::Log {
+                    samples: others,
                     faults: more,
                 },
             ) => {
-                let (track, faults) = (track.and(other), [faults, more].concat());
-                Self::Log { track, faults }
+                samples.extend(others);
+                samples.sort_by_key(Sample::order);
+                faults.extend(more);
+                Self::Log { samples, faults }
             }
             (Self::None, other) => other,
             (one, _) => one,
         }
     }
 
-    /// Returns the same with each sample of a log as `change` returns it, or without it.
+    /// Returns the same with each sample of a log as `change` returns it, or without it. Of samples
+    /// that have the same place in the order the first one stays.
     #[must_use]
     pub fn changed(self, change: impl FnMut(&Sample) -> Option<Sample>) -> Self {
         match self {
-            Self::Log { track, faults } => Self::Log {
-                track: track.changed(change),
-                faults,
-            },
+            Self::Log { samples, faults } => {
+                let mut samples: Vec<Sample> = samples.iter().filter_map(change).collect();
+                samples.sort_by_key(Sample::order);
+                samples.dedup_by_key(|sample| sample.order());
+                Self::Log { samples, faults }
+            }
             other => other,
         }
     }
@@ -131,8 +147,8 @@ impl ScanSamples {
         }
     }
 
-    fn of_track(
-        mut track: SampleTrack,
+    fn of_samples(
+        mut samples: Vec<Sample>,
         (of, path): (SampleKind, &Path),
         faults: &LogFaults,
         dataset: &dyn Dataset,
@@ -140,11 +156,11 @@ impl ScanSamples {
         let last = dataset.len().saturating_sub(1);
         let [first_ns, last_ns] =
             [dataset.first(), last].map(|index| dataset.nominal_stamp_ns(index));
-        if let (Some(first_ns), Some(last_ns), Some(span_ns)) = (first_ns, last_ns, track.span_ns())
-            && track.between(first_ns, last_ns).is_empty()
+        if let (Some(first_ns), Some(last_ns), Some(begin)) = (first_ns, last_ns, samples.first())
+            && between(&samples, first_ns, last_ns).is_empty()
         {
             let (of, path) = (of.section(), path.display());
-            let after_s = (span_ns[0] - first_ns) as f64 * 1e-9;
+            let after_s = (begin.stamp_ns - first_ns) as f64 * 1e-9;
             let steps = match faults.clock_steps_s.is_empty() {
                 true => String::new(),
                 false => format!("{}. ", faults.clock_steps()),
@@ -154,10 +170,10 @@ impl ScanSamples {
             )));
         }
         let named = |sentence| format!("{}: {sentence}", path.display());
-        let jumps = track.leave_out_jumps(of);
+        let jumps = jumps::leave_out(&mut samples, of).sentence();
         let faults = faults.sentences(of).into_iter().chain(jumps);
         let faults = faults.map(named).collect();
-        Ok(Self::Log { track, faults })
+        Ok(Self::Log { samples, faults })
     }
 
     /// Returns a sentence for each kind of fault in the logs, as of samples that are left out.
@@ -180,10 +196,130 @@ impl ScanSamples {
                     samples => samples.iter().copied().filter(is_used).collect(),
                 }
             }
-            Self::Log { track, .. } => {
+            Self::Log { samples, .. } => {
                 let [after_ns, until_ns] = interval_of(span_ns);
-                Cow::Borrowed(track.between(after_ns, until_ns))
+                Cow::Borrowed(between(samples, after_ns, until_ns))
             }
         }
+    }
+}
+
+/// Returns the samples with stamps after one time and up to another, which is included.
+fn between(samples: &[Sample], after_ns: i64, until_ns: i64) -> &[Sample] {
+    let up_to = |ns| samples.partition_point(|sample| sample.stamp_ns <= ns);
+    samples
+        .get(up_to(after_ns)..up_to(until_ns))
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use gyre_samples::UpAxis;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    use UpAxis::{MinusX, MinusY, MinusZ, X, Y, Z};
+    const AXES: [UpAxis; 6] = [X, MinusX, Y, MinusY, Z, MinusZ];
+
+    /// Samples of these stamps, in any order.
+    fn of(mut stamps: Vec<i64>) -> Vec<Sample> {
+        stamps.sort_unstable();
+        let samples = stamps.iter().map(|ns| Sample::yaw_rate(*ns, 0.0));
+        samples.collect()
+    }
+
+    proptest! {
+        /// Intervals that follow one another take every sample once, whatever their bounds.
+        #[test]
+        fn each_sample_is_of_one_interval(
+            stamps in prop::collection::vec(0i64..1000, 0..50),
+            mut bounds in prop::collection::vec(-10i64..1010, 2..20),
+        ) {
+            bounds.sort_unstable();
+            let samples = of(stamps.clone());
+            let taken = bounds.windows(2).flat_map(|pair| between(&samples, pair[0], pair[1]));
+            let taken: Vec<i64> = taken.map(|sample| sample.stamp_ns).collect();
+            let within = |ns: &i64| bounds[0] < *ns && *ns <= *bounds.last().unwrap();
+            let mut expected: Vec<i64> = stamps.into_iter().filter(within).collect();
+            expected.sort_unstable();
+            prop_assert_eq!(taken, expected);
+        }
+    }
+
+    fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    }
+
+    /// Whatever axis points up, the third rate is the rate about it, and the axes stay
+    /// right-handed.
+    #[test]
+    fn the_axes_are_right_handed() {
+        for up in AXES {
+            let [x, y, z] =
+                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| up.in_vehicle(axis));
+            assert_eq!(cross(x, y), z, "{up:?}");
+            let axis = ["x", "y", "z"]
+                .iter()
+                .position(|axis| up.name().ends_with(axis));
+            let about = [x, y, z][axis.unwrap()][2];
+            assert_eq!(
+                about,
+                if up.name().starts_with('-') {
+                    -1.0
+                } else {
+                    1.0
+                }
+            );
+        }
+    }
+
+    #[test]
+    fn delay_axis_and_scale_are_applied_and_the_bias_is_not() {
+        let sample = Sample {
+            values: [0.1, 0.2, -0.3, 1.0, 2.0, -9.8],
+            ..Sample::yaw_rate(5_000_000_000, 0.0)
+        };
+        let log = SampleLog::of_gyro(vec![sample], Path::new("log")).unwrap();
+        let config = GyroConfig {
+            delay_s: 1.58,
+            up: Some(MinusZ),
+            scale: 1.01,
+            bias_radps: 0.5,
+            ..GyroConfig::default()
+        };
+        let sample = config.on_radar(&log.samples[0]);
+        assert_eq!(sample.stamp_ns, 3_420_000_000);
+        assert_eq!(sample.values, [0.1, -0.2, 0.3 * 1.01, 1.0, -2.0, 9.8]);
+    }
+
+    #[test]
+    fn changed_samples_are_in_order_and_no_two_have_one_stamp() {
+        let late = |sample: &Sample| Sample {
+            stamp_ns: sample.stamp_ns + if sample.stamp_ns < 3 { 2 } else { 0 },
+            ..*sample
+        };
+        let kept = |sample: &Sample| (sample.stamp_ns != 5).then(|| late(sample));
+        let log = ScanSamples::Log {
+            samples: of(vec![1, 2, 3, 4, 5, 6]),
+            faults: Vec::new(),
+        };
+        let ScanSamples::Log { samples, .. } = log.changed(kept) else {
+            panic!("no log");
+        };
+        let stamps: Vec<i64> = samples.iter().map(|it| it.stamp_ns).collect();
+        assert_eq!(stamps, [3, 4, 6]);
+    }
+
+    #[test]
+    fn a_reversed_interval_has_no_samples() {
+        let samples = of(vec![5]);
+        assert!(between(&samples, 7, 3).is_empty() && between(&samples, 5, 5).is_empty());
+        assert_eq!(between(&samples, 4, 5).len(), 1);
     }
 }

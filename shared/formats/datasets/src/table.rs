@@ -175,38 +175,15 @@ impl Unreadable {
 }
 
 fn why(row: &StringRecord, columns: usize) -> String {
-    let is_number = |text: &str| text.trim().parse::<f64>().is_ok();
-    let is_date = |text: &str| {
-        let has_digits = text.starts_with(|first: char| first.is_ascii_digit());
-        has_digits
-            && (text.contains(':') || text.matches(['-', '/']).count() == 2)
-            && !is_number(text)
-    };
-    let has_comma = |text: &str| text.contains(',') && is_number(&text.replacen(',', ".", 1));
-    let has_letter = |text: &str| {
-        let degrees = text.strip_suffix(['N', 'S', 'E', 'W', 'n', 's', 'e', 'w']);
-        degrees.is_some_and(is_number)
-    };
-    type IsSo<'a> = &'a dyn Fn(&str) -> bool;
-    let remedies: [(IsSo<'_>, &str); 3] = [
-        (
-            &is_date,
-            "is a date or a time of day: write stamps as seconds or nanoseconds since 1970",
-        ),
-        (&has_comma, "has a decimal comma: write decimal points"),
-        (
-            &has_letter,
-            "has a letter: write degrees to the south and to the west with a minus",
-        ),
-    ];
-    let mut found = remedies.iter().filter_map(|(is_so, remedy)| {
-        let field = row.iter().find(|field| is_so(field))?;
-        Some(format!("{} {remedy}", quoted(field)))
-    });
-    found.next().unwrap_or_else(|| match row.len() {
+    match row.len() {
         fields if fields != columns => format!(
             "it has {fields} fields in place of {columns}: do all rows have the mark between columns that the first row has, and decimal points in place of commas?"
         ),
-        _ => "are its stamps, decimal points and columns those that its header names?".to_owned(),
-    })
+        _ => {
+            let row = quoted(&row.iter().collect::<Vec<_>>().join("; "));
+            format!(
+                "in {row}, write stamps as seconds or nanoseconds since 1970, numbers with decimal points, and degrees to the south and to the west with a minus"
+            )
+        }
+    }
 }

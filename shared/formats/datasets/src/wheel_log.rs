@@ -12,9 +12,9 @@ use gyre_samples::{Sample, SampleKind};
 use counts::CountColumns;
 
 use crate::{
-    LogError, LogFaults,
+    LogError, SampleLog,
     gyro_log::faults::{Plausible, examine},
-    header::{Header, Sign, Stamp, unit_of},
+    header::{Header, Stamp, unit_of},
     logs,
     table::{Columns, Raw},
 };
@@ -31,50 +31,29 @@ const SPEEDS: Plausible = Plausible {
     beyond: "have speeds beyond 100 m/s: if they are in km/h, name the column so, as speed_km_h",
 };
 
-/// The log of the wheels, on its own clock.
-#[derive(Clone, Debug, Default)]
-pub struct WheelLog {
-    /// The samples in the order of their stamps, which all differ, in m/s.
-    pub samples: Vec<Sample>,
-    pub faults: LogFaults,
-    pub path: PathBuf,
-}
-
-impl WheelLog {
-    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or in
-    /// `stamp_ns,ticks` for ticks of `m_per_tick` metres.
-    pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
+impl SampleLog {
+    /// Reads the log of the wheels. Its first row names the columns, as in `stamp_ns,speed_m_s`, or
+    /// in `stamp_ns,ticks` for ticks of `m_per_tick` metres.
+    pub fn read_wheels(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
         let no_speed = match logs::rows::<SpeedColumns>(path, OF) {
-            Ok(rows) => return Self::examined(rows.raw, rows.columns.unit.is_none(), path),
+            Ok(rows) => return examine(rows.raw, rows.columns.unit.is_none(), path, &SPEEDS),
             Err(error) => error,
         };
         match logs::rows::<CountColumns>(path, OF) {
-            Ok(rows) => Ok(Self::with(counts::speeds(rows, path, m_per_tick)?, path)),
+            Ok(rows) => counts::speeds(rows, path, m_per_tick),
             Err(_) => Err(no_speed),
         }
     }
 
     /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
     /// images.
-    pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
+    pub fn find_wheels(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES)
     }
 
-    /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
-        Self::examined(Raw::of(samples), false, path)
-    }
-
-    fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
-        examine(raw, unit_is_assumed, path, &SPEEDS).map(|examined| Self::with(examined, path))
-    }
-
-    fn with((samples, faults): (Vec<Sample>, LogFaults), path: &Path) -> Self {
-        Self {
-            samples,
-            faults,
-            path: path.to_owned(),
-        }
+    /// Takes the samples of wheels in a bag or a simulation, which messages name by this path.
+    pub fn of_wheels(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
+        examine(Raw::of(samples), false, path, &SPEEDS)
     }
 }
 
@@ -88,55 +67,38 @@ const UNITS: [(&str, f64); 3] = [
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
 
 /// Columns with the direction of a speed that has no sign.
-const DIRECTION: Sign = Sign {
-    names: "direction driving_direction travel_direction",
-    plus: "1 +1 f d forward forwards",
-    minus: "-1 b r backward backwards reverse",
-};
-const REVERSE: Sign = Sign {
-    names: "reverse is_reverse reversing",
-    plus: "0 false",
-    minus: "1 true",
-};
-
-const SIGNS: [&Sign; 2] = [&DIRECTION, &REVERSE];
+const DIRECTIONS: &str =
+    "direction driving_direction travel_direction reverse is_reverse reversing";
 
 struct SpeedColumns {
     stamp: Stamp,
     speed: usize,
     /// Factor that makes speeds m/s; `None`: it is named nowhere.
     unit: Option<f64>,
-    sign: Option<(usize, &'static Sign)>,
 }
 
 impl Columns for SpeedColumns {
     type Entry = Sample;
 
     fn by_names(header: &Header) -> Result<Self, String> {
-        let sign = header.sign(&SIGNS);
         let columns = header.listed();
-        let missing = |what| match sign {
-            Some(_) => format!(
-                "its columns {columns} have a direction, which is applied to speeds alone: let the counts run backwards, and remove the direction"
-            ),
-            None => format!("its columns {columns} have no {what}: {REMEDY}"),
-        };
+        if header.find(DIRECTIONS).is_some() {
+            return Err(format!(
+                "its columns {columns} have a direction: write what goes backwards with a minus, and remove the direction"
+            ));
+        }
+        let missing = |what| format!("its columns {columns} have no {what}: {REMEDY}");
         let speed = header.first(|name| unit_of(name, NAMES, &UNITS));
         let (speed, unit) = speed.ok_or_else(|| missing("speed"))?;
         Ok(Self {
             stamp: header.stamp().ok_or_else(|| missing("stamps"))?,
             speed,
             unit,
-            sign,
         })
     }
 
     fn entry(&self, row: &StringRecord) -> Option<Sample> {
         let speed = row.get(self.speed)?.parse::<f64>().ok()? * self.unit.unwrap_or(1.0);
-        let speed = match self.sign {
-            Some((column, sign)) => sign.apply(speed, row.get(column)?)?,
-            None => speed,
-        };
         Some(Sample::speed(self.stamp.ns(row)?, speed))
     }
 }

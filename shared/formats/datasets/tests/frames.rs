@@ -1,16 +1,12 @@
-//! Poses in space, with roll and pitch, in the frames that vehicles and cameras have.
+//! Poses in space, with roll and pitch.
 
-use std::{fmt::Write, fs};
+use std::fs;
 
 use crate::common::assert_refused;
 use gyre_datasets::{TrajectoryError, read_trajectory};
 use gyre_geometry::{Pose, pose};
 use gyre_radar::Trajectory;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
-
-const START_US: i64 = 1_630_597_331_000_000;
-/// A place in UTM, m.
-const CORNER_M: [f64; 3] = [623_422.85, 4_848_820.47, 153.98];
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 fn read(text: &str) -> Result<Trajectory, TrajectoryError> {
     let folder = tempfile::tempdir().unwrap();
@@ -40,12 +36,6 @@ fn planar(drive: &[Isometry3<f64>]) -> Vec<Pose> {
         pose(p.translation.x, p.translation.y, ahead.y.atan2(ahead.x))
     };
     drive.iter().map(plane).collect()
-}
-
-/// From a vehicle's axes to a camera's: x right, y down, z forward.
-fn camera_from_vehicle() -> UnitQuaternion<f64> {
-    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
 }
 
 fn kitti_line(pose: &Isometry3<f64>) -> String {
@@ -78,81 +68,30 @@ fn assert_near(found: &[Pose], expected: &[Pose], apart_m: f64) {
 }
 
 #[test]
-fn boreas_odometry_is_inverted_in_space_and_then_projected() {
-    let corner = Translation3::from(Vector3::from(CORNER_M));
-    let drive: Vec<_> = drive(0.3).iter().map(|pose| corner * pose).collect();
-    let mut text = String::new();
-    for (k, pose) in drive.iter().enumerate() {
-        let line = kitti_line(&pose.inverse());
-        let _ = write!(text, "{} {line}", START_US + 100_000 * k as i64);
-    }
-    let found = read(&text).unwrap();
-    assert_near(&found.poses, &planar(&drive), 1e-5);
-    assert_eq!(found.stamp_ns.unwrap()[1], (START_US + 100_000) * 1000);
-}
-
-/// Where the world is the first frame of a sensor with y to the right and z down.
-#[test]
-fn boreas_odometry_from_the_first_frame_is_mirrored() {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    let drive = drive(0.3);
-    let first = drive[0].inverse();
-    let drive: Vec<_> = drive.iter().map(|pose| first * pose).collect();
-    let mut text = String::new();
-    for (k, pose) in drive.iter().enumerate() {
-        let line = kitti_line(&(down * pose.inverse() * down));
-        let _ = write!(text, "{} {line}", START_US + 100_000 * k as i64);
-    }
-    assert_near(&read(&text).unwrap().poses, &planar(&drive), 1e-9);
+fn poses_with_times_in_place_of_an_index_are_refused() {
+    let line = kitti_line(&Isometry3::identity());
+    let refused = read(&format!("1630597331000000 {line}"));
+    assert_refused(refused, "the first of its 13 columns is a time");
+    assert!(read(&format!("7 {line}")).is_ok());
 }
 
 #[test]
-fn poses_of_a_camera_are_in_its_plane_of_motion() {
-    let from_vehicle = camera_from_vehicle();
+fn poses_in_space_are_projected_to_the_plane() {
     for bend in [0.0, 0.02, 0.9] {
         let drive = drive(bend);
-        let camera = |pose: &Isometry3<f64>| from_vehicle * pose * from_vehicle.inverse();
-        let camera: Vec<_> = drive.iter().map(camera).collect();
-        // As a camera in the world of a vehicle.
-        let mixed = drive.iter().map(|pose| pose * from_vehicle.inverse());
-        let mixed: Vec<_> = mixed.collect();
         let expected = planar(&drive);
-        for poses in [&drive, &camera, &mixed] {
-            assert_near(&read(&kitti(poses)).unwrap().poses, &expected, 1e-6);
-            assert_near(&read(&tum(poses)).unwrap().poses, &expected, 1e-6);
-        }
+        assert_near(&read(&kitti(&drive)).unwrap().poses, &expected, 1e-6);
+        assert_near(&read(&tum(&drive)).unwrap().poses, &expected, 1e-6);
     }
-}
-
-#[test]
-fn positions_of_a_camera_are_in_its_plane_of_motion() {
-    let drive = drive(0.3);
-    let only = |turn: UnitQuaternion<f64>| -> Vec<_> {
-        let positions = drive.iter().map(|pose| turn * pose.translation.vector);
-        positions
-            .map(|p| Isometry3::from_parts(p.into(), UnitQuaternion::identity()))
-            .collect()
-    };
-    let ahead = |p: &Isometry3<f64>| pose(p.translation.x, p.translation.y, 0.0);
-    let expected: Vec<_> = drive.iter().map(ahead).collect();
-    for turn in [UnitQuaternion::identity(), camera_from_vehicle()] {
-        let found = read(&kitti(&only(turn))).unwrap();
-        assert_near(&found.poses, &expected, 1e-6);
-    }
-}
-
-#[test]
-fn a_vehicle_that_stands_turns_in_the_plane_of_its_frame() {
     let turns = (0..40).map(|k| UnitQuaternion::from_euler_angles(0.0, 0.0, 0.1 * f64::from(k)));
-    let drive: Vec<_> = turns
+    let standing: Vec<_> = turns
         .map(|turn| Isometry3::from_parts(Translation3::identity(), turn))
         .collect();
-    let from_vehicle = camera_from_vehicle();
-    let camera = |pose: &Isometry3<f64>| from_vehicle * pose * from_vehicle.inverse();
-    let camera: Vec<_> = drive.iter().map(camera).collect();
-    for poses in [&drive, &camera] {
-        assert_near(&read(&kitti(poses)).unwrap().poses, &planar(&drive), 1e-9);
-    }
+    assert_near(
+        &read(&kitti(&standing)).unwrap().poses,
+        &planar(&standing),
+        1e-9,
+    );
 }
 
 #[test]

@@ -14,8 +14,6 @@
 //! so that a reader finds a message even in a file whose writer was killed before its summary.
 
 pub mod bags;
-mod disk;
-mod early_lines;
 mod error;
 pub mod file;
 mod generations;

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{Read, Seek, SeekFrom},
+    io::{self, BufRead, BufReader, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
@@ -10,14 +10,12 @@ use serde_json::Value;
 
 use crate::LogLine;
 
-/// The most that is read at once, bytes.
+/// The most that is read at once, bytes; a longer line is none of the log.
 const MAX_BYTES: u64 = 1 << 20;
 
 pub struct LogTail {
     path: PathBuf,
     offset: u64,
-    /// The start of a line whose end is not written yet.
-    begun: Vec<u8>,
 }
 
 impl LogTail {
@@ -34,7 +32,6 @@ impl LogTail {
         Self {
             path: path.to_owned(),
             offset: 0,
-            begun: Vec::new(),
         }
     }
 
@@ -47,38 +44,31 @@ impl LogTail {
             .collect()
     }
 
-    /// Returns the complete lines that were appended since the last call, or the first of them. A
-    /// log that cannot be read has none: it may come later.
+    /// Returns the lines that were completed since the last call. A log that cannot be read has
+    /// none: it may come later.
     pub fn texts(&mut self) -> Vec<String> {
-        let Some(appended) = self.appended() else {
-            return Vec::new();
-        };
-        self.begun.extend(appended);
-        let Some(end) = self.begun.iter().rposition(|byte| *byte == b'\n') else {
-            if self.begun.len() as u64 > MAX_BYTES {
-                // The rest of the last part is not a line of the log, and is skipped.
-                self.begun.clear();
-            }
-            return Vec::new();
-        };
-        let rest = self.begun.split_off(end + 1);
-        let lines = std::mem::replace(&mut self.begun, rest);
-        let lines = String::from_utf8_lossy(&lines);
-        lines.lines().map(str::to_owned).collect()
+        self.read().unwrap_or_default()
     }
 
-    fn appended(&mut self) -> Option<Vec<u8>> {
-        let mut file = File::open(&self.path).ok()?;
-        let bytes = file.metadata().ok()?.len();
-        if bytes < self.offset {
+    fn read(&mut self) -> io::Result<Vec<String>> {
+        let mut file = File::open(&self.path)?;
+        if file.metadata()?.len() < self.offset {
             // It had become too long, and was emptied.
-            (self.offset, self.begun) = (0, Vec::new());
+            self.offset = 0;
         }
-        let mut appended = Vec::new();
-        file.seek(SeekFrom::Start(self.offset)).ok()?;
-        file.take(MAX_BYTES).read_to_end(&mut appended).ok()?;
-        self.offset += appended.len() as u64;
-        Some(appended)
+        file.seek(SeekFrom::Start(self.offset))?;
+        let mut reader = BufReader::new(file.take(MAX_BYTES));
+        let (mut line, mut lines) = (Vec::new(), Vec::new());
+        while reader.read_until(b'\n', &mut line)? > 0 {
+            let is_whole = line.ends_with(b"\n");
+            if !is_whole && (line.len() as u64) < MAX_BYTES {
+                break;
+            }
+            self.offset += line.len() as u64;
+            lines.push(String::from_utf8_lossy(line.trim_ascii_end()).into_owned());
+            line.clear();
+        }
+        Ok(lines)
     }
 }
 
@@ -138,7 +128,6 @@ mod tests {
         for _ in 0..3 {
             append(&endless);
             assert_eq!(tail.lines(8), []);
-            assert!(tail.begun.len() as u64 <= MAX_BYTES);
         }
         append("\n{\"level\":\"INFO\",\"fields\":{\"message\":\"after it\"}}\n");
         assert_eq!(tail.lines(8)[0].message, "after it");

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_datasets::{Dataset, DatasetOptions, FileList, Format, OpenError, foreign};
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError};
 
 use crate::{
-    Recording, RecordingError,
+    Recording,
     bags::{self, is_bag},
     parts::{first_part_in, parts},
     scans::Scans,
@@ -45,16 +45,13 @@ pub fn reopen(
     root: &Path,
     options: &DatasetOptions,
     format: Format,
-    files: FileList,
+    files: Vec<PathBuf>,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     match format {
-        Format::Mcap => {}
-        Format::Ros2Bag => return bags::reopen(root, options, &files),
-        _ => return gyre_datasets::reopen(root, options, format, files),
+        Format::Mcap => open_parts(&files, root, options),
+        Format::Ros2Bag => bags::reopen(root, options, files),
+        _ => gyre_datasets::reopen(root, options, format, files),
     }
-    let paths = (0..files.len()).filter_map(|index| files.get(index));
-    let paths: Vec<PathBuf> = paths.map(Path::to_owned).collect();
-    open_parts(&paths, root, options)
 }
 
 /// As [`gyre_datasets::stored_options`]: for a recording, the options of its run.
@@ -80,13 +77,7 @@ fn recording_of(paths: &[PathBuf], root: &Path) -> Result<Recording, OpenError> 
         let reason = format!("there is no recording {}", root.display());
         return Err(OpenError::Recording(reason));
     }
-    Recording::open(paths).map_err(|error| {
-        // It may be an archive that is only named as a recording.
-        let is_other = !matches!(error, RecordingError::Io { .. });
-        let archive = paths.first().filter(|_| is_other);
-        let archive = archive.and_then(|path| foreign(path));
-        archive.unwrap_or_else(|| error.into())
-    })
+    Ok(Recording::open(paths)?)
 }
 
 fn open_parts(

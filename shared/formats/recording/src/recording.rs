@@ -2,7 +2,6 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    io,
     path::{Path, PathBuf},
 };
 
@@ -64,8 +63,8 @@ struct Place {
 type Places = Vec<(String, Vec<Entry>, Span)>;
 
 impl Recording {
-    /// Opens the files of a recording, in order. Files of a different recording than the first are
-    /// left out.
+    /// Opens the files of a recording, at least one, in order. Files of a different recording than
+    /// the first are left out.
     pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
         let mut recording = Self::default();
         for path in paths {
@@ -76,13 +75,7 @@ impl Recording {
                 false => recording.left_out.push(path.clone()),
             }
         }
-        match recording.parts.is_empty() {
-            true => Err(RecordingError::io(
-                Path::new(""),
-                io::ErrorKind::NotFound.into(),
-            )),
-            false => Ok(recording),
-        }
+        Ok(recording)
     }
 
     /// Adds a part. Two messages with the same number are equal, unless the number was reassigned:

@@ -1,11 +1,14 @@
 //! The scans of a recording as a dataset: bytes, azimuths, times and constants as they were
 //! recorded.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use gyre_datasets::{
-    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, OpenError, Properties,
-    ReadError, check_capacity, turn_ns,
+    DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError, Properties, ReadError,
+    turn_ns,
 };
 use gyre_messages::{Message, Scan, ScanHeader};
 use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
@@ -20,7 +23,7 @@ const MAX_SCANS: u64 = 50_000_000;
 pub(crate) struct Scans {
     recording: Recording,
     properties: Properties,
-    files: FileList,
+    files: Vec<PathBuf>,
     entries: BTreeMap<usize, Entry>,
     first: SweepGeometry,
     /// Of the scan that was read last.
@@ -107,14 +110,10 @@ impl Scans {
             ("azimuth_source", source),
             ("encoder_counts", counts.map(|counts| counts.to_string())),
         ];
+        let reason = "its scans have the constants that they were recorded with; leave the key out";
         for (key, value) in refused {
             if let Some(value) = value {
-                return Err(OpenError::BadOption {
-                    key,
-                    value,
-                    format: Some(Format::Mcap),
-                    reason: "its scans have the constants that they were recorded with; leave the key out",
-                });
+                return Err(OpenError::option(Some(Format::Mcap), key, value, reason));
             }
         }
         Ok(())
@@ -163,7 +162,7 @@ impl Dataset for Scans {
         self.entries.keys().next().copied().unwrap_or_default()
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.files
     }
 
@@ -208,7 +207,10 @@ impl Dataset for Scans {
             .and_then(|end| stored.payload.get(..end));
         let (powers, azimuths) = (powers.ok_or_else(damaged)?, geometry.azimuths);
         let bytes = powers.len();
-        check_capacity(ScanLimits { bytes, azimuths }, &slot)?;
+        let limits = self.limits();
+        if bytes > limits.bytes || azimuths > limits.azimuths {
+            return Err(damaged());
+        }
         slot.bytes[..bytes].copy_from_slice(powers);
         slot.azimuth_rad[..azimuths].copy_from_slice(&header.azimuth_rad[..azimuths]);
         slot.stamp_ns[..azimuths].copy_from_slice(&header.azimuth_stamp_ns[..azimuths]);

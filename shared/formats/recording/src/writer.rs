@@ -1,8 +1,12 @@
 //! Writes a recording: a chunk at least twice a second, each with its table behind it.
 
+#[cfg(test)]
+mod tests;
+
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, VecDeque},
     fs::{File, OpenOptions},
+    io::{self, Seek},
     mem,
     os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
@@ -16,15 +20,14 @@ use gyre_messages::{GivenAnew, Item, topic};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
 use crate::{
-    ENCODING, Entry, Head, LogLine, RecordingError,
-    disk::{Disk, Synchronise},
-    early_lines::EarlyLines,
-    exact_channel, generations,
+    ENCODING, Entry, Head, LogLine, RecordingError, exact_channel, generations,
     image::Rows,
     table::Table,
     view::{Recent, View, image_channel, views},
 };
 
+/// The longest time for which a chunk is not synchronised. A power failure loses at most this much.
+const SYNC_PERIOD: Duration = Duration::from_secs(1);
 /// The longest time for which a message stays in memory. At four scans a second the history of the
 /// topics covers twice as much, so that a recorder that is killed and started again misses none.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
@@ -32,6 +35,9 @@ const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
 const LEVEL: u32 = 1;
+
+/// Log lines that wait for the first message: a radar may be switched on days after the recorder.
+const MAX_EARLY: usize = 4096;
 
 const PROTOBUF: &str = "protobuf";
 /// The channel of the run's health, and its schema: any JSON object.
@@ -52,11 +58,19 @@ pub struct Incoming {
     pub skipped: Option<GivenAnew>,
 }
 
+type Synchronise = Arc<dyn Fn(&File) -> io::Result<()> + Send + Sync>;
+
 pub struct RecordingWriter {
     pub path: PathBuf,
     /// `None` after a failure.
     mcap: Option<Writer<File>>,
-    disk: Disk,
+    /// The file beside the one that the library writes to.
+    file: File,
+    synchronise: Synchronise,
+    /// Length of the file up to the last complete table.
+    complete_bytes: u64,
+    /// When the oldest chunk that is not synchronised was written.
+    unsynchronised: Option<Instant>,
     channels: BTreeMap<String, u16>,
     recent: Recent,
     table: Table,
@@ -68,8 +82,8 @@ pub struct RecordingWriter {
     /// The newest time of the sensor when this file had its first message, which may be of an
     /// earlier scan: topics lag behind `scan`.
     first_ns: Option<i64>,
-    /// Log lines that came before the first message.
-    early: EarlyLines,
+    /// The newest log lines that came before the first message.
+    early: VecDeque<LogLine>,
 }
 
 /// Returns the header of a message: the sensor's time, and when it was received.
@@ -98,7 +112,7 @@ impl RecordingWriter {
         let mut new = OpenOptions::new();
         new.write(true).create_new(true).mode(0o600);
         let file = new.open(path).map_err(failed)?;
-        let disk = Disk::of(file.try_clone().map_err(failed)?, synchronise);
+        let own = file.try_clone().map_err(failed)?;
         let options = WriteOptions::new()
             .compression(Some(Compression::Zstd))
             .compression_level(LEVEL)
@@ -112,7 +126,10 @@ impl RecordingWriter {
         let mut writer = Self {
             path: path.to_owned(),
             mcap: Some(options.create(file).map_err(unwritable)?),
-            disk,
+            file: own,
+            synchronise,
+            complete_bytes: 0,
+            unsynchronised: None,
             channels: BTreeMap::new(),
             recent: Recent::default(),
             table: Table::default(),
@@ -120,7 +137,7 @@ impl RecordingWriter {
             pending: (0, None),
             newest_ns: None,
             first_ns: None,
-            early: EarlyLines::default(),
+            early: VecDeque::new(),
         };
         writer.begin(head).map_err(unwritable)?;
         // Its name survives a power failure too.
@@ -200,7 +217,10 @@ impl RecordingWriter {
     /// Adds a line of the log at the time of the newest scan.
     pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
         if self.newest_ns.is_none() {
-            self.early.push(line);
+            if self.early.len() == MAX_EARLY {
+                self.early.pop_front();
+            }
+            self.early.push_back(line);
             return Ok(());
         }
         self.checked(|writer| writer.write_log(&line))
@@ -212,7 +232,7 @@ impl RecordingWriter {
     }
 
     fn write_early(&mut self) -> Result<(), McapError> {
-        let mut lines = mem::take(&mut self.early).into_lines();
+        let mut lines = mem::take(&mut self.early).into_iter();
         lines.try_for_each(|line| self.write_log(&line))
     }
 
@@ -230,7 +250,7 @@ impl RecordingWriter {
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        self.disk.complete_bytes
+        self.complete_bytes
     }
 
     /// Returns the time from the newest scan when the file was begun to the newest one now, on the
@@ -282,7 +302,10 @@ impl RecordingWriter {
         if is_due {
             self.flush()?;
         }
-        self.checked(|writer| Ok(writer.disk.synchronise_if_due()?))
+        match self.unsynchronised {
+            Some(since) if since.elapsed() >= SYNC_PERIOD => self.checked(Self::synchronise),
+            _ => Ok(()),
+        }
     }
 
     /// Writes the messages so far as a chunk, and its table.
@@ -301,7 +324,16 @@ impl RecordingWriter {
         self.mcap()?.flush()?;
         self.table.entries.clear();
         self.pending = (0, None);
-        Ok(self.disk.complete()?)
+        // The file of the library and this one have one position.
+        self.complete_bytes = self.file.stream_position()?;
+        self.unsynchronised.get_or_insert_with(Instant::now);
+        Ok(())
+    }
+
+    fn synchronise(&mut self) -> Result<(), McapError> {
+        (self.synchronise)(&self.file)?;
+        self.unsynchronised = None;
+        Ok(())
     }
 
     /// Writes the remaining messages and the summary.
@@ -312,7 +344,7 @@ impl RecordingWriter {
 
     /// Continues in the next part after this one has ended.
     pub(crate) fn go_on(&mut self, path: &Path, head: &Head) -> Result<(), RecordingError> {
-        let next = Self::create_with(path, head, self.disk.synchronise.clone())?;
+        let next = Self::create_with(path, head, self.synchronise.clone())?;
         let before = mem::replace(self, next);
         // The state of viewers continues.
         (self.recent, self.newest_ns) = (before.recent, before.newest_ns);
@@ -323,7 +355,7 @@ impl RecordingWriter {
         self.flush()?;
         self.checked(|writer| {
             writer.mcap()?.finish()?;
-            Ok(writer.disk.synchronise()?)
+            writer.synchronise()
         })
     }
 
@@ -341,7 +373,7 @@ impl RecordingWriter {
         write(self).map_err(|source| {
             // Dropped as it is, it would write a summary.
             drop(self.mcap.take().map(Writer::into_inner));
-            let _ = self.disk.cut_back();
+            let _ = self.file.set_len(self.complete_bytes);
             RecordingError::of(&self.path, source)
         })
     }

@@ -399,23 +399,3 @@ fn the_name_of_a_topic_is_not_kept_for_each_of_its_messages() {
     write_chunk(&path, [(topic.clone(), rows)].into(), 1);
     assert_eq!(opened(&path).entries(&topic).count(), 1_000_000);
 }
-
-#[test]
-fn an_archive_that_is_named_as_a_recording_is_called_what_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("drive.mcap");
-    let refused = || {
-        open(&path, &DatasetOptions::default())
-            .err()
-            .unwrap()
-            .to_string()
-    };
-    for (bytes, words) in [
-        (&b"PK\x03\x04...."[..], "is a ZIP archive"),
-        (b"#ROSBAG V2.0\n", "is a bag of ROS 1"),
-        (b"something", "signature of MCAP"),
-    ] {
-        fs::write(&path, bytes).unwrap();
-        assert!(refused().contains(words), "{}", refused());
-    }
-}

@@ -22,4 +22,4 @@ pub mod visualization_msgs;
 pub use cdr::{BadMessage, decode, encode};
 pub use definition::{Definition, Ros2Message};
 pub use domain::{Domain, DomainError};
-pub use mounting::{BadMounting, Mounting};
+pub use mounting::Mounting;

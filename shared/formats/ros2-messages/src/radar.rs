@@ -10,4 +10,5 @@ mod configuration;
 mod scan;
 
 pub use b_scan::TimedAzimuth;
+pub use configuration::DescribedRadar;
 pub use scan::{Encoder, ScanMessages};

@@ -92,8 +92,7 @@ fn a_turned_image_is_turned_back() {
     turned.b_scan_img.data.rotate_right(5 * 8);
     let powers = |message: &RadarBScanMsg, offset| -> Vec<Vec<u8>> {
         let rows = message.rows(&radar(), offset, START_NS).unwrap();
-        rows.map(|row| row.azimuth.powers.bytes().to_vec())
-            .collect()
+        rows.map(|row| row.azimuth.powers.to_vec()).collect()
     };
     assert_eq!(powers(&turned, 5), powers(&plain, 0));
     assert_ne!(powers(&turned, 0), powers(&plain, 0));
@@ -152,7 +151,10 @@ fn older(bin_size: [u8; 8]) -> Result<Configuration, String> {
         expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
         ..RadarConfigurationMessage::default()
     };
-    message.configuration().map_err(|error| error.to_string())
+    let described = message.configuration();
+    described
+        .map(|it| it.radar)
+        .map_err(|error| error.to_string())
 }
 
 fn newer(bin_size: f32) -> Result<Configuration, String> {
@@ -164,7 +166,10 @@ fn newer(bin_size: f32) -> Result<Configuration, String> {
         expected_rotation_rate: 4000,
         ..RadarConfigurationMsg::default()
     };
-    message.configuration().map_err(|error| error.to_string())
+    let described = message.configuration();
+    described
+        .map(|it| it.radar)
+        .map_err(|error| error.to_string())
 }
 
 #[test]
@@ -189,7 +194,7 @@ fn depths_of_bins_come_back_to_the_bit() {
             ..radar()
         };
         let message = RadarConfigurationMsg::of(&radar, Header::default());
-        let described = message.configuration().unwrap();
+        let described = message.configuration().unwrap().radar;
         assert_eq!(described.range_resolution_m(), resolution_m);
     }
 }

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use gyre_datasets::{Dataset, GyroLog, ScanSamples, WheelLog, open_source};
+use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
 use gyre_geometry::{Pose, SparsePoint, xy_yaw};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
@@ -101,9 +101,9 @@ impl Drive {
         );
         let wheels = write("wheels.csv", "stamp_ns,speed_m_s\n", wheels);
         let dataset = self.dataset.as_ref();
-        let turns = GyroLog::read(&gyro)
+        let turns = SampleLog::read_gyro(&gyro)
             .and_then(|log| ScanSamples::of_gyro(&log, &self.config.gyro, dataset));
-        let speeds = WheelLog::read(&wheels, None)
+        let speeds = SampleLog::read_wheels(&wheels, None)
             .and_then(|log| ScanSamples::of_wheels(&log, &self.config.wheels, dataset));
         let text = |error: gyre_datasets::LogError| error.to_string();
         Ok(turns.map_err(text)?.and(speeds.map_err(text)?))

@@ -2,12 +2,13 @@
 
 use std::os::fd::BorrowedFd;
 
-use gyre_colossus::{Azimuth, Configuration};
+use gyre_colossus::Azimuth;
 use gyre_ros2_messages::{
     BadMessage, Definition, Ros2Message,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     nav_msgs::Odometry,
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    radar::DescribedRadar,
     sensor_msgs::Imu,
     std_msgs::Header,
 };
@@ -92,13 +93,6 @@ pub struct Driver {
     fixes: Option<Fixes>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DescribedRadar {
-    pub radar: Configuration,
-    /// The rotation of images by the driver, in rows.
-    pub azimuth_offset: u16,
-}
-
 impl Driver {
     pub fn open(settings: &Settings) -> Result<Self, StageError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
@@ -177,18 +171,12 @@ impl Driver {
         if let Ok(Some((message, _))) = self.configurations.take()
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
         {
-            return Ok(Some(DescribedRadar {
-                radar: message.configuration()?,
-                azimuth_offset: message.azimuth_offset,
-            }));
+            return message.configuration().map(Some);
         }
         if let Ok(Some((message, _))) = self.older.take()
             && self.is_described_as(RadarConfigurationMessage::DEFINITION)
         {
-            return Ok(Some(DescribedRadar {
-                radar: message.configuration()?,
-                azimuth_offset: 0,
-            }));
+            return message.configuration().map(Some);
         }
         Ok(None)
     }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use gyre_messages::{ScanHeader, StageId};
-use gyre_ros2_messages::navtech_msgs::RadarBScanMsg;
+use gyre_ros2_messages::{navtech_msgs::RadarBScanMsg, radar::DescribedRadar};
 use gyre_samples::{Sample, SampleKind};
 use gyre_stage::{
     StageError, clock,
@@ -19,7 +19,7 @@ use ros2_client::Gid;
 use super::{
     Settings,
     configuration_estimate::ConfigurationEstimate,
-    driver::{DescribedRadar, Driver, Packet, PacketMessage},
+    driver::{Driver, Packet, PacketMessage},
 };
 
 const MAX_MESSAGES: usize = 512;

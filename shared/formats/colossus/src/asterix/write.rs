@@ -1,8 +1,8 @@
 //! Azimuths as datagrams, as a radar sends them.
 
-use super::{ANGLES, BLOCK_BYTES, CATEGORY, FEMTO, HALF_C_MPS, SPECIAL_BYTES, VIDEO};
+use super::{ANGLES, BLOCK_BYTES, CATEGORY, EIGHT_BITS, FEMTO, HALF_C_MPS, SPECIAL_BYTES, VIDEO};
 use crate::configuration::Configuration;
-use crate::message::{Azimuth, Powers};
+use crate::message::Azimuth;
 
 /// The bytes of a datagram that a radar sends unless it is configured otherwise, at most.
 pub const MAX_DATAGRAM_BYTES: usize = 1400;
@@ -26,23 +26,12 @@ pub fn write_azimuth(
     number: &mut u32,
     send: &mut dyn FnMut(&[u8]),
 ) {
-    let (bin_bytes, powers) = match azimuth.powers {
-        Powers::Eight(powers) => (1, powers),
-        Powers::Sixteen(powers) => (2, powers),
-    };
     // Whole blocks, so that only the last datagram has padding.
     let part = (MAX_DATAGRAM_BYTES - OVERHEAD_BYTES) / BLOCK_BYTES[1] * BLOCK_BYTES[1];
     let mut datagram = Vec::with_capacity(MAX_DATAGRAM_BYTES);
-    for (k, powers) in powers.chunks(part).enumerate() {
+    for (k, powers) in azimuth.powers.chunks(part).enumerate() {
         datagram.clear();
-        let first = k * part / bin_bytes;
-        write(
-            &mut datagram,
-            radar,
-            azimuth,
-            *number,
-            (first, bin_bytes, powers),
-        );
+        write(&mut datagram, radar, azimuth, *number, (k * part, powers));
         *number = number.wrapping_add(1);
         send(&datagram);
     }
@@ -55,18 +44,18 @@ pub fn write_description(out: &mut Vec<u8>, radar: &Configuration, number: u32) 
         encoder: 0,
         seconds: [0; 4],
         split_seconds: [0; 4],
-        powers: Powers::Eight(&[]),
+        powers: &[],
     };
-    write(out, radar, &azimuth, number, (0, 1, &[]));
+    write(out, radar, &azimuth, number, (0, &[]));
 }
 
-/// Appends a message of some bins of an azimuth: the first, the bytes of each, and their powers.
+/// Appends a message of some bins of an azimuth: the first, and their powers.
 fn write(
     out: &mut Vec<u8>,
     radar: &Configuration,
     azimuth: &Azimuth<'_>,
     number: u32,
-    (first, bin_bytes, powers): (usize, usize, &[u8]),
+    (first, powers): (usize, &[u8]),
 ) {
     let begin = out.len();
     let size = u32::from(radar.encoder_size.max(1));
@@ -84,9 +73,9 @@ fn write(
     out.extend(angle(encoder + step).to_be_bytes());
     out.extend((first as u32).to_be_bytes());
     out.extend(((resolution_m / HALF_C_MPS * FEMTO).round() as u32).to_be_bytes());
-    out.extend([0, 3 + bin_bytes as u8]);
+    out.extend([0, EIGHT_BITS]);
     out.extend((powers.len() as u16).to_be_bytes());
-    out.extend(&((powers.len() / bin_bytes) as u32).to_be_bytes()[1..]);
+    out.extend(&(powers.len() as u32).to_be_bytes()[1..]);
     out.push(blocks as u8);
     out.extend_from_slice(powers);
     let padding = blocks * BLOCK_BYTES[1] - powers.len();

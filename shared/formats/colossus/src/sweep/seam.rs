@@ -9,9 +9,7 @@ const BREAK_TURNS: f64 = 0.75;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
-    encoder_size: u16,
-    step: f64,
-    ns_per_count: f64,
+    pub(super) radar: Configuration,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,41 +24,33 @@ pub(super) struct Seam {
 }
 
 impl Grid {
-    pub(super) fn new(configuration: &Configuration) -> Self {
-        Self {
-            encoder_size: configuration.encoder_size,
-            step: configuration.step(),
-            ns_per_count: configuration.ns_per_count(),
-        }
-    }
-
     /// Returns an encoder count less than a full turn. A full turn is 0, as for the readers of
     /// recordings.
     pub(super) fn encoder(&self, count: u16) -> Option<u16> {
-        (count <= self.encoder_size).then_some(count % self.encoder_size)
+        (count <= self.radar.encoder_size).then_some(count % self.radar.encoder_size)
     }
 
     pub(super) fn is_first(&self, encoder: u16) -> bool {
-        f64::from(encoder) < self.step
+        f64::from(encoder) < self.radar.step()
     }
 
     pub(super) fn is_last(&self, last: Reading) -> bool {
-        f64::from(last.encoder) + self.step >= f64::from(self.encoder_size)
+        f64::from(last.encoder) + self.radar.step() >= f64::from(self.radar.encoder_size)
     }
 
     pub(super) fn azimuths_after(&self, last: Reading) -> f64 {
-        (f64::from(self.encoder_size) - f64::from(last.encoder)) / self.step
+        (f64::from(self.radar.encoder_size) - f64::from(last.encoder)) / self.radar.step()
     }
 
     pub(super) fn is_break(&self, last: Reading, here: Reading) -> bool {
-        let expected_ns = self.counts(last, here) * self.ns_per_count;
-        let turn_ns = f64::from(self.encoder_size) * self.ns_per_count;
+        let expected_ns = self.counts(last, here) * self.radar.ns_per_count();
+        let turn_ns = f64::from(self.radar.encoder_size) * self.radar.ns_per_count();
         (elapsed_ns(last, here) - expected_ns).abs() > BREAK_TURNS * turn_ns
     }
 
     pub(super) fn gap(&self, last: Reading, here: Reading) -> Empty {
         let counts = self.counts(last, here);
-        let rows = (counts / self.step).round().max(1.0);
+        let rows = (counts / self.radar.step()).round().max(1.0);
         Empty {
             count: rows as usize - 1,
             from: (last.encoder.into(), last.stamp_ns),
@@ -70,19 +60,19 @@ impl Grid {
     }
 
     pub(super) fn seam(&self, last: Reading, here: Reading) -> Seam {
-        let to_zero = f64::from(self.encoder_size - last.encoder);
+        let to_zero = f64::from(self.radar.encoder_size - last.encoder);
         // Positions before zero, which zero itself is not.
-        let before_zero = (to_zero / self.step).ceil() as usize - 1;
+        let before_zero = (to_zero / self.radar.step()).ceil() as usize - 1;
         // The step across zero may be shorter than the others.
-        let counts = self.step;
+        let counts = self.radar.step();
         if self.is_break(last, here) {
             // Nothing is known of the time in between: both sweeps are continued at the radar's
             // rotation.
             return Seam {
                 trailing: before_zero,
-                leading: (f64::from(here.encoder) / self.step) as usize,
+                leading: (f64::from(here.encoder) / self.radar.step()) as usize,
                 counts,
-                ns: self.step * self.ns_per_count,
+                ns: self.radar.step() * self.radar.ns_per_count(),
             };
         }
         let Empty { count, ns, .. } = self.gap(last, here);
@@ -98,7 +88,7 @@ impl Grid {
     fn counts(&self, last: Reading, here: Reading) -> f64 {
         let counts = f64::from(here.encoder) - f64::from(last.encoder);
         match counts < 0.0 {
-            true => counts + f64::from(self.encoder_size),
+            true => counts + f64::from(self.radar.encoder_size),
             false => counts,
         }
     }

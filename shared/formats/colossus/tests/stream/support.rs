@@ -1,8 +1,7 @@
 //! A radar that turns.
 
 use gyre_colossus::{
-    Azimuth, ClockFormat, Configuration, Counters, Event, Parser, Powers, RadarClock, Sweep,
-    SweepAssembler,
+    Azimuth, ClockFormat, Configuration, Counters, Event, Parser, RadarClock, Sweep, SweepAssembler,
 };
 use gyre_datasets::DatasetOptions;
 use gyre_radar::OwnedScan;
@@ -41,7 +40,7 @@ impl SentAzimuth {
             encoder: self.encoder,
             seconds,
             split_seconds,
-            powers: Powers::Eight(&self.powers),
+            powers: &self.powers,
         }
     }
 }
@@ -89,7 +88,7 @@ impl Assembly {
 
     /// Adds an azimuth, and returns whether it completes a sweep.
     pub fn add(&mut self, azimuth: &Azimuth<'_>, stamp_ns: i64) -> bool {
-        let sweep = self.assembler.add(azimuth, stamp_ns, self.slot.slot());
+        let sweep = self.assembler.add(azimuth, stamp_ns, &mut self.slot.slot());
         if let Some(sweep) = sweep {
             self.slot.geometry = sweep.geometry;
             let scan = self.slot.view();
@@ -151,7 +150,7 @@ pub fn stamped(
             stamped.push(SentAzimuth {
                 encoder: azimuth.encoder,
                 stamp_ns,
-                powers: azimuth.powers.bytes().to_vec(),
+                powers: azimuth.powers.to_vec(),
             });
         }
     }

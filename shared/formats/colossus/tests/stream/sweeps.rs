@@ -1,8 +1,6 @@
 //! Azimuths to scans.
 
-use gyre_colossus::{
-    Azimuth, ByteOrder, ClockFormat, Configuration, Counters, Powers, SweepAssembler,
-};
+use gyre_colossus::{ClockFormat, Configuration, Counters, SweepAssembler};
 use gyre_datasets::{DatasetOptions, correct_eccentricity};
 use gyre_radar::{OwnedScan, Sense, scan::flag};
 use proptest::prelude::*;
@@ -173,34 +171,6 @@ fn rows_of_other_lengths_are_padded_and_cut() {
 }
 
 #[test]
-fn the_order_of_16_bit_powers_is_found() {
-    let radar = configuration(5600, 300);
-    let rows = turns(&radar, 0, START_NS, 1);
-    // A power that changes slowly, with noise in its lower byte.
-    let power = |k: usize, bin: usize| 8000 + (bin * 20 + k) as u16 + (bin * 7919 % 251) as u16;
-    for order in [ByteOrder::Little, ByteOrder::Big] {
-        let mut assembly = Assembly::new(&radar);
-        for (k, row) in rows.iter().enumerate() {
-            let bytes = |bin| match order {
-                ByteOrder::Little => power(k, bin).to_le_bytes(),
-                ByteOrder::Big => power(k, bin).to_be_bytes(),
-            };
-            let bytes: Vec<u8> = (0..300).flat_map(bytes).collect();
-            let azimuth = Azimuth {
-                powers: Powers::Sixteen(&bytes),
-                ..row.azimuth(ClockFormat::default())
-            };
-            assembly.add(&azimuth, row.stamp_ns);
-        }
-        let scan = assembly.sweeps[0].1.view();
-        for k in 0..400 {
-            let expected: Vec<u8> = (0..300).map(|bin| (power(k, bin) >> 8) as u8).collect();
-            assert_eq!(scan.row(k), expected);
-        }
-    }
-}
-
-#[test]
 fn a_scan_has_the_constants_given() {
     let radar = configuration(5600, 4);
     let constants = DatasetOptions {
@@ -215,7 +185,7 @@ fn a_scan_has_the_constants_given() {
     let rows = turns(&radar, 0, START_NS, 1);
     let mut sweeps = rows.iter().filter_map(|row| {
         let azimuth = row.azimuth(ClockFormat::default());
-        assembler.add(&azimuth, row.stamp_ns, scan.slot())
+        assembler.add(&azimuth, row.stamp_ns, &mut scan.slot())
     });
     let geometry = sweeps.next().unwrap().geometry;
     assert_eq!(geometry.range_resolution_m, 0.0596);

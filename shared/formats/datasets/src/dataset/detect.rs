@@ -5,9 +5,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
-use super::file_list::FileList;
 use super::first_image::FirstImage;
-use super::foreign::{foreign, foreign_in};
 use super::format::Format;
 use super::image_list::has_png;
 use super::image_source::ImageSource;
@@ -36,8 +34,12 @@ impl Found {
         }
     }
 
-    pub(crate) fn listed(root: &Path, format: Format, files: FileList) -> Result<Self, OpenError> {
-        let folder = files.get(0).and_then(Path::parent).unwrap_or(root);
+    pub(crate) fn listed(
+        root: &Path,
+        format: Format,
+        files: Vec<PathBuf>,
+    ) -> Result<Self, OpenError> {
+        let folder = files.first().and_then(|file| file.parent()).unwrap_or(root);
         let folder = folder.to_owned();
         let images = Images::listed(&folder, files)?;
         Ok(Self::new(format, folder, images))
@@ -128,10 +130,10 @@ fn other_format(root: &Path, configured: Option<Format>) -> Option<OpenError> {
 fn check_folder(root: &Path) -> Result<(), OpenError> {
     match fs::metadata(root) {
         Ok(entry) if entry.is_dir() => Ok(()),
-        Ok(_) => Err(foreign(root).unwrap_or_else(|| {
-            let fault = "is a file: give the folder of the dataset, which holds the radar images or their folder, or a recording or bag of ROS 2 as MCAP";
-            OpenError::at(root, fault)
-        })),
+        Ok(_) => {
+            let fault = "is a file: give the folder of the dataset, which holds the radar images or their folder (unpack an archive before), or a recording or bag of ROS 2 as MCAP (`rosbags-convert` of `pip install rosbags` makes it of a bag of ROS 1)";
+            Err(OpenError::at(root, fault))
+        }
         Err(e) if e.kind() == ErrorKind::NotFound => Err(OpenError::Recording(format!(
             "there is no dataset at {}: no such folder; check the path",
             root.display()
@@ -161,9 +163,6 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
     }
     if fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_none()) {
         return Err(OpenError::no_images(root));
-    }
-    if let Some(error) = foreign_in(root) {
-        return Err(error);
     }
     let mut folders: Vec<&str> = known().copied().collect();
     folders.dedup();
@@ -237,7 +236,7 @@ fn evidence(image: &FirstImage) -> String {
     let of = |is_so: bool, words| if is_so { words } else { "" };
     let chirps = of(image.chirps_alternate(), ", chirps alternate");
     let unit = of(image.nanoseconds(), ", stamps in ns");
-    format!("{} range bins, {named}{chirps}{unit}.", image.bins())
+    format!("{} range bins, {named}{chirps}{unit}.", image.bins)
 }
 
 const NEVER: i32 = -100;
@@ -253,7 +252,7 @@ fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
     };
     let is_in_ns = format == Format::MulranOxfordForm;
     by_name
-        + 2 * i32::from(profile.bins == Some(image.bins()))
+        + 2 * i32::from(profile.bins == Some(image.bins))
         + 2 * i32::from(image.chirps_alternate() == profile.chirps)
         - 1
         - 3 * i32::from(image.nanoseconds() != is_in_ns)

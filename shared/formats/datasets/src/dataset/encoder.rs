@@ -18,25 +18,23 @@ pub const FIRST_TURNS: usize = 8;
 /// turn took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncoderTurn {
-    counts: Vec<u16>,
+    /// The steps of the encoder; `None` for counts that are of no turn.
+    step: Option<EncoderStep>,
     /// ns; the time over the encoder's zero counts as any other, since azimuths can be missing
     /// there.
     turn_ns: Option<i64>,
 }
 
 impl EncoderTurn {
-    pub fn new(counts: Vec<u16>, time_ns: impl Fn(usize) -> Option<i64>) -> Self {
-        let turn_ns = turn_ns(&counts, time_ns);
-        Self { counts, turn_ns }
+    pub fn new(counts: &[u16], time_ns: impl Fn(usize) -> Option<i64>) -> Self {
+        Self {
+            step: EncoderStep::of(counts),
+            turn_ns: turn_ns(counts, time_ns),
+        }
     }
 
     pub(crate) fn turn_ns(&self) -> Option<i64> {
         self.turn_ns
-    }
-
-    /// Returns the steps of the encoder; `None` for counts that are of no turn.
-    pub(crate) fn step(&self) -> Option<EncoderStep> {
-        EncoderStep::of(&self.counts)
     }
 
     fn is_turn(&self, turn_ns: Option<i64>) -> bool {
@@ -109,13 +107,13 @@ impl EncoderStep {
 /// otherwise the number that makes the step over the seam as the others, of those that took
 /// `turn_ns` if that is known. `None` if they do not show it.
 pub fn encoder_counts(turns: &[EncoderTurn], turn_ns: Option<i64>, usual: u16) -> Option<u16> {
-    let fits = |turn: &EncoderTurn| turn.step().is_some_and(|step| step.fits(usual));
+    let fits = |turn: &EncoderTurn| turn.step.is_some_and(|step| step.fits(usual));
     if turns.iter().any(fits) {
         return Some(usual);
     }
     let whole = turns.iter().filter(|turn| turn.is_turn(turn_ns));
     // A turn that lacks azimuths at its seam shows too few.
-    whole.filter_map(|turn| turn.step()?.size()).max()
+    whole.filter_map(|turn| turn.step?.size()).max()
 }
 
 #[cfg(test)]
@@ -124,8 +122,8 @@ mod tests {
 
     #[test]
     fn a_turn_that_took_another_time_shows_no_size() {
-        let counts = (0..360).map(|k| 7 + 14 * k).collect();
-        let turn = EncoderTurn::new(counts, |row| Some(row as i64 * 625_000));
+        let counts: Vec<u16> = (0..360).map(|k| 7 + 14 * k).collect();
+        let turn = EncoderTurn::new(&counts, |row| Some(row as i64 * 625_000));
         assert_eq!(turn.turn_ns(), Some(225_000_000));
         let turns = [turn];
         assert_eq!(encoder_counts(&turns, Some(250_000_000), 5600), None);
@@ -137,7 +135,7 @@ mod tests {
     fn counts_that_are_no_turn_show_no_size() {
         let back_and_forth = [9, 3].repeat(5);
         for counts in [&[][..], &[5, 19, 33], &[7; 400], &back_and_forth] {
-            let turn = EncoderTurn::new(counts.to_vec(), |_| None);
+            let turn = EncoderTurn::new(counts, |_| None);
             assert_eq!(encoder_counts(&[turn], None, 5600), None, "{counts:?}");
         }
     }

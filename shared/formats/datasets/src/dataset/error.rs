@@ -29,6 +29,21 @@ pub enum OpenError {
 }
 
 impl OpenError {
+    pub fn option(
+        format: Option<Format>,
+        key: &'static str,
+        value: impl Display,
+        reason: &'static str,
+    ) -> Self {
+        let value = value.to_string();
+        Self::BadOption {
+            key,
+            value,
+            format,
+            reason,
+        }
+    }
+
     pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         let path = path.to_owned();
         Self::Io { path, source }
@@ -60,12 +75,6 @@ pub enum ReadError {
     Io { path: PathBuf, source: io::Error },
     #[error("{path} is corrupt: {reason}; copy or download it again")]
     Damaged { path: PathBuf, reason: String },
-    #[error("the slot holds {actual} {what}, but this scan needs {needed}")]
-    SlotTooSmall {
-        what: &'static str,
-        needed: usize,
-        actual: usize,
-    },
     /// Any other fault: a sentence.
     #[error("{0}")]
     Scan(String),

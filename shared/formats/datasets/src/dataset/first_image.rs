@@ -30,7 +30,7 @@ impl NamedBy {
 
 pub(crate) struct FirstImage {
     rows: Vec<RowMetadata>,
-    bins: usize,
+    pub(crate) bins: usize,
     pub(crate) name_ns: Option<i64>,
 }
 
@@ -46,10 +46,6 @@ impl FirstImage {
             bins: size.width - METADATA_BYTES,
             name_ns: images.name_stamp_ns(index),
         }))
-    }
-
-    pub(crate) fn bins(&self) -> usize {
-        self.bins
     }
 
     pub(crate) fn has_stamps(&self) -> bool {
@@ -98,7 +94,7 @@ impl FirstImage {
     }
 
     pub(crate) fn turn(&self) -> EncoderTurn {
-        let counts = self.rows.iter().map(|row| row.count).collect();
-        EncoderTurn::new(counts, |row| self.row_ns(row))
+        let counts: Vec<u16> = self.rows.iter().map(|row| row.count).collect();
+        EncoderTurn::new(&counts, |row| self.row_ns(row))
     }
 }

@@ -5,19 +5,12 @@ use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fs::{self, DirEntry};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::error::OpenError;
-use super::file_list::FileList;
 use super::stamp;
 
 const MAX_NAMED: usize = 4;
-
-#[derive(Debug, Default)]
-pub(crate) struct ImageList {
-    pub(crate) files: FileList,
-    pub(crate) note: Option<String>,
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum SeriesPosition {
@@ -39,8 +32,8 @@ impl SeriesPosition {
 /// are named by, otherwise by name.
 ///
 /// Left out are hidden files, copies of a numbered image, whatever is named otherwise than at least
-/// half of the images, and a second file of the same number.
-pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
+/// half of the images, and a second file of the same number: a sentence names them.
+pub(crate) fn list(folder: &Path) -> Result<(Vec<PathBuf>, Option<String>), OpenError> {
     let io_error = |source| OpenError::io(folder, source);
     let mut names: Vec<OsString> = Vec::new();
     for entry in fs::read_dir(folder).map_err(io_error)? {
@@ -48,10 +41,8 @@ pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
     }
     let (names, mut others) = series(names);
     others.sort_unstable();
-    Ok(ImageList {
-        files: names.iter().map(|name| folder.join(name)).collect(),
-        note: note(&others, "not of the series by name"),
-    })
+    let files = names.iter().map(|name| folder.join(name)).collect();
+    Ok((files, note(&others, "not of the series by name")))
 }
 
 pub(crate) fn note(left_out: &[OsString], because: &str) -> Option<String> {

@@ -2,12 +2,11 @@
 
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::error::{OpenError, ReadError};
-use super::file_list::FileList;
 use super::format::Format;
-use super::image_list::{self, ImageList, file_number};
+use super::image_list::{self, file_number};
 use super::image_size::ImageSize;
 use super::image_source::ImageSource;
 use super::png_image::{self, ImageReader};
@@ -20,7 +19,7 @@ const SIZES: usize = 32;
 
 /// Images in order, of one width.
 pub(crate) struct Images {
-    pub(crate) files: FileList,
+    pub(crate) files: Vec<PathBuf>,
     pub(crate) size: ImageSize,
     pub(crate) max_rows: usize,
     reader: ImageReader,
@@ -31,11 +30,11 @@ pub(crate) struct Images {
 impl Images {
     /// Lists `folder`, and returns its images with sentences on the omitted ones.
     pub(crate) fn open(folder: &Path) -> Result<(Self, Vec<String>), OpenError> {
-        let ImageList { files, note } = image_list::list(folder)?;
+        let (files, note) = image_list::list(folder)?;
         Ok((Self::listed(folder, files)?, note.into_iter().collect()))
     }
 
-    pub(crate) fn listed(folder: &Path, files: FileList) -> Result<Self, OpenError> {
+    pub(crate) fn listed(folder: &Path, files: Vec<PathBuf>) -> Result<Self, OpenError> {
         if files.is_empty() {
             return Err(OpenError::no_images(folder));
         }
@@ -50,7 +49,7 @@ impl Images {
     }
 
     pub(crate) fn of(source: Box<dyn ImageSource>) -> Result<Self, OpenError> {
-        let (files, size): (FileList, _) = (source.files().into_iter().collect(), source.size());
+        let (files, size) = (source.files(), source.size());
         if files.is_empty() {
             return Err(OpenError::no_images(&source.folder()));
         }
@@ -69,7 +68,8 @@ impl Images {
 
     /// The file of an image; an empty path past the end.
     pub(crate) fn file(&self, index: usize) -> &Path {
-        self.files.get(index).unwrap_or(Path::new(""))
+        let file = self.files.get(index);
+        file.map_or(Path::new(""), PathBuf::as_path)
     }
 
     pub(crate) fn number(&self, index: usize) -> Option<i64> {
@@ -94,12 +94,7 @@ impl Images {
         let len = self.files.len();
         let path = self.files.get(index);
         let path = path.ok_or(ReadError::NoSuchScan { index, len })?;
-        let (actual, needed) = (pixels.len(), self.size.width * rows.end());
-        let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
-            what: "bytes",
-            needed,
-            actual,
-        })?;
+        let pixels = &mut pixels[..self.size.width * rows.end()];
         match &mut self.source {
             None => self.reader.decode(path, self.size, rows, pixels),
             Some(source) => {
@@ -146,7 +141,7 @@ impl Images {
 
 /// Returns the size of most images among some, and the rows of the tallest of that width. Where
 /// they differ, images between may have a few more.
-fn sizes(files: &FileList) -> Result<(ImageSize, usize), ReadError> {
+fn sizes(files: &[PathBuf]) -> Result<(ImageSize, usize), ReadError> {
     let (mut counts, mut failed) = (Vec::<(ImageSize, usize)>::new(), None);
     let spread = (0..files.len()).step_by(files.len().div_ceil(SIZES));
     // Each once: the first ones are no more of the images than others.

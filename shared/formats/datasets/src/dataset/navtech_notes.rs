@@ -38,18 +38,3 @@ fn note_bursts(image: &FirstImage, profile: &Profile) -> Option<String> {
         )
     })
 }
-
-/// Returns a sentence on counts per turn that are configured, if the rows show other ones.
-pub(super) fn note_encoder(image: &FirstImage, profile: &Profile) -> Option<String> {
-    let counts = profile.encoder_counts;
-    let step = image.turn().step().filter(|step| !step.fits(counts))?;
-    let (seam, size) = (step.seam(counts)?, step.size()?);
-    let (step, off_deg) = (
-        step.step,
-        360.0 * (f64::from(size) / f64::from(counts) - 1.0).abs(),
-    );
-    Some(format!(
-        "The encoder steps by {step} counts per row and by {seam} from the last row to the first, with {counts} counts per turn: \
-         `encoder_counts = {size}` would make the steps equal, and change azimuths by up to {off_deg:.2} deg."
-    ))
-}

@@ -5,21 +5,21 @@ use super::detect::Found;
 use super::eccentricity::correct_eccentricity;
 use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 use super::error::{OpenError, ReadError};
-use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_size::ImageSize;
 use super::images::Images;
-use super::navtech_notes::{note_encoder, observations};
+use super::navtech_notes::observations;
 use super::navtech_png::{self, METADATA_BYTES};
 use super::options::{AzimuthSource, DatasetOptions};
 use super::profiles::{Profile, ScanTime};
 use super::row_order;
 use super::stamp;
-use super::{Dataset, Properties, check_capacity};
+use super::{Dataset, Properties};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 /// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of
 /// metadata.
@@ -56,10 +56,10 @@ impl NavtechScans {
         let mut first_image = FirstImage::read(&mut images)?;
         let order = |image| row_order::order(&mut images, image);
         let mut starts_ns = None;
-        if let Some(order) = first_image.as_ref().and_then(order) {
+        if let Some((starts, more)) = first_image.as_ref().and_then(order) {
             first_image = FirstImage::read(&mut images)?;
-            starts_ns = Some(order.starts_ns);
-            notes.extend(order.notes);
+            starts_ns = Some(starts);
+            notes.extend(more);
         }
         let named_by = first_image.as_ref().and_then(FirstImage::named_by);
         let meaning = match starts_ns {
@@ -88,8 +88,8 @@ impl NavtechScans {
             scans.max_sweep_ns = MAX_SWEEP_PERIODS * turn_ns;
         }
         if let Some(image) = &first_image {
-            if scans.has_encoder() {
-                scans.find_encoder(image, turn_ns, options.encoder_counts.is_some());
+            if scans.has_encoder() && options.encoder_counts.is_none() {
+                scans.find_encoder(image, turn_ns);
             }
             let notes = observations(image, format, &scans.profile);
             scans.properties.notes.extend(notes);
@@ -99,16 +99,12 @@ impl NavtechScans {
         Ok(scans)
     }
 
-    /// Takes the size of the encoder that the first images show, unless it is the usual one. If it
-    /// is configured, or the first image took less or more than a turn, the size is only reported.
-    fn find_encoder(&mut self, image: &FirstImage, turn_ns: Option<i64>, is_configured: bool) {
+    /// Takes the size of the encoder that the first images show, unless it is the usual one, or the
+    /// first image took less or more than a turn.
+    fn find_encoder(&mut self, image: &FirstImage, turn_ns: Option<i64>) {
         let usual = self.profile.encoder_counts;
         let by_first = encoder_counts(&[image.turn()], turn_ns, usual);
-        if is_configured || by_first.is_none() {
-            let note = note_encoder(image, &self.profile);
-            return self.properties.notes.extend(note);
-        }
-        if by_first == Some(usual) {
+        if by_first.is_none_or(|counts| counts == usual) {
             return;
         }
         let found = encoder_counts(&self.first_turns(), turn_ns, usual);
@@ -126,8 +122,8 @@ impl NavtechScans {
         let turn = |index| {
             let decoded = self.images.decode(index, rows.clone(), &mut pixels);
             let rows: Vec<_> = navtech_png::rows(&pixels, decoded.ok()?).collect();
-            let counts = rows.iter().map(|row| row.count).collect();
-            Some(EncoderTurn::new(counts, |row| {
+            let counts: Vec<u16> = rows.iter().map(|row| row.count).collect();
+            Some(EncoderTurn::new(&counts, |row| {
                 stamp::to_ns(rows.get(row)?.stamp)
             }))
         };
@@ -200,7 +196,7 @@ impl Dataset for NavtechScans {
         &self.properties
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.images.files
     }
 
@@ -223,7 +219,6 @@ impl Dataset for NavtechScans {
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
-        check_capacity(self.limits(), &slot)?;
         let rows = self.accepted_rows();
         let size = self.images.decode(index, rows, slot.bytes)?;
         let (path, profile) = (self.images.file(index), &self.profile);

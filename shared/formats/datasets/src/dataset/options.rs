@@ -26,22 +26,6 @@ pub enum LostAzimuthOption {
     Ignore,
 }
 
-/// Keys, and the reasons of their bounds.
-const BINS: [&str; 2] = [
-    "range_resolution_m",
-    "radars of 0.1 to 7.5 GHz bandwidth have bins of 1.5 to 0.02 m",
-];
-const OFFSET: [&str; 2] = ["range_offset_m", "the delays inside radars make -5 to 5 m"];
-const DOPPLER: [&str; 2] = ["doppler_s", "it must be from -1 to 1 s"];
-const ECCENTRICITY: [&str; 2] = [
-    "azimuth_eccentricity_rad",
-    "it must be from -0.1 to 0.1 rad",
-];
-const COUNTS: [&str; 2] = [
-    "encoder_counts",
-    "an encoder has at least 16 counts per turn",
-];
-
 /// The longest name of a topic, bytes.
 const TOPIC_BYTES: usize = 256;
 
@@ -95,21 +79,34 @@ impl DatasetOptions {
     /// Rejects values out of bounds.
     pub fn check(&self) -> Result<(), OpenError> {
         let counts = self.encoder_counts.map(f32::from);
-        // Value, bounds, key and reason.
-        let mut checks = [
-            (self.range_resolution_m, 0.02..=1.5, BINS),
-            (self.range_offset_m, -5.0..=5.0, OFFSET),
-            (self.doppler_s, -1.0..=1.0, DOPPLER),
-            (self.azimuth_eccentricity_rad, -0.1..=0.1, ECCENTRICITY),
-            (counts, 16.0..=f32::INFINITY, COUNTS),
-        ]
-        .into_iter();
-        let invalid =
-            checks.find(|(value, bounds, _)| value.is_some_and(|it| !bounds.contains(&it)));
-        invalid.map_or(Ok(()), |(value, _, [key, reason])| {
-            let value = value.map(|it| it.to_string()).unwrap_or_default();
-            Err(Self::invalid(None, key, value, reason))
-        })
+        let bins = "radars of 0.1 to 7.5 GHz bandwidth have bins of 1.5 to 0.02 m";
+        let eccentricity = self.azimuth_eccentricity_rad;
+        let by_delays = "the delays inside radars make -5 to 5 m";
+        let a_second = "it must be from -1 to 1 s";
+        let a_tenth = "it must be from -0.1 to 0.1 rad";
+        let sixteen = "an encoder has at least 16 counts per turn";
+        for (key, value, bounds, reason) in [
+            (
+                "range_resolution_m",
+                self.range_resolution_m,
+                0.02..=1.5,
+                bins,
+            ),
+            ("range_offset_m", self.range_offset_m, -5.0..=5.0, by_delays),
+            ("doppler_s", self.doppler_s, -1.0..=1.0, a_second),
+            (
+                "azimuth_eccentricity_rad",
+                eccentricity,
+                -0.1..=0.1,
+                a_tenth,
+            ),
+            ("encoder_counts", counts, 16.0..=f32::INFINITY, sixteen),
+        ] {
+            if let Some(value) = value.filter(|value| !bounds.contains(value)) {
+                return Err(OpenError::option(None, key, value, reason));
+            }
+        }
+        Ok(())
     }
 
     /// Returns these options; `other` supplies the ones that are not set.
@@ -125,15 +122,9 @@ impl DatasetOptions {
     /// Rejects the option of bags, for images.
     pub(crate) fn check_without_topics(&self, format: Format) -> Result<(), OpenError> {
         let reason = "images have no topics; leave the key out";
-        match self.topic {
-            Some(topic) => Err(Self::invalid(
-                Some(format),
-                "topic",
-                topic.to_string(),
-                reason,
-            )),
-            None => Ok(()),
-        }
+        self.topic.map_or(Ok(()), |topic| {
+            Err(OpenError::option(Some(format), "topic", topic, reason))
+        })
     }
 
     /// Rejects options that require an encoder, for images without encoder counts.
@@ -144,20 +135,6 @@ impl DatasetOptions {
             _ => return Ok(()),
         };
         let reason = "its images have no encoder counts";
-        Err(Self::invalid(Some(format), key, value, reason))
-    }
-
-    fn invalid(
-        format: Option<Format>,
-        key: &'static str,
-        value: String,
-        reason: &'static str,
-    ) -> OpenError {
-        OpenError::BadOption {
-            key,
-            value,
-            format,
-            reason,
-        }
+        Err(OpenError::option(Some(format), key, value, reason))
     }
 }

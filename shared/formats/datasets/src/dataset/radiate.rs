@@ -34,18 +34,10 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
         Some(text) => text.clone(),
         None => read_list(&list)?,
     };
-    let (stamps, unpadded) = parse_stamps(&list, &text)?;
+    let stamps = parse_stamps(&list, &text)?;
     let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
     scans.stale = scans.stale.map(StaleRows::of_compressed);
     add_turns(&mut scans, &stamps, &list)?;
-    if unpadded > 0 {
-        scans.properties.notes.push(format!(
-            "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
-             read as decimals, time would run backwards.",
-            stamps.len(),
-            file_name(&list)
-        ));
-    }
     if stamps.len() > scans.turns.len() {
         scans.properties.notes.push(format!(
             "{} lists {} scans, but there are {} images.",
@@ -59,7 +51,7 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
 
 /// Reads a list of `Frame: <number> Time: <seconds>.<nanoseconds>`: the times by frame number, ns.
 pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
-    Ok(parse_stamps(list, &read_list(list)?)?.0)
+    parse_stamps(list, &read_list(list)?)
 }
 
 fn read_list(list: &Path) -> Result<String, OpenError> {
@@ -75,26 +67,17 @@ fn read_list(list: &Path) -> Result<String, OpenError> {
 /// A frame number and a time of receipt, ns.
 type Receipt = (i64, i64);
 
-#[derive(Debug, PartialEq)]
-struct Segment {
-    first: i64,
-    receipts: Vec<Receipt>,
-}
-
 /// Divides the frames where the time between two of them contradicts their numbers, as after a
 /// pause or when the clock was set. A single time that is off is left out.
-fn segments(received: &[Receipt]) -> Vec<Segment> {
-    let mut segments: Vec<Segment> = Vec::new();
+fn segments(received: &[Receipt]) -> Vec<Vec<Receipt>> {
+    let mut segments: Vec<Vec<Receipt>> = Vec::new();
     for (index, receipt) in received.iter().enumerate() {
         let next = received.get(index + 1);
         let open = segments.last_mut();
-        match open.and_then(|segment| Some((*segment.receipts.last()?, segment))) {
-            Some((last, segment)) if agree(last, *receipt) => segment.receipts.push(*receipt),
+        match open.and_then(|segment| Some((*segment.last()?, segment))) {
+            Some((last, segment)) if agree(last, *receipt) => segment.push(*receipt),
             Some((last, _)) if next.is_some_and(|next| agree(last, *next)) => {}
-            _ => segments.push(Segment {
-                first: receipt.0,
-                receipts: vec![*receipt],
-            }),
+            _ => segments.push(vec![*receipt]),
         }
     }
     segments
@@ -118,7 +101,7 @@ fn add_turns(
     let segments = segments(&received);
     let mut used: BTreeSet<i64> = BTreeSet::new();
     let (mut clocks, mut early) = (Vec::new(), Vec::new());
-    for Segment { first, receipts } in &segments {
+    for receipts in &segments {
         let Some((clock, ignored)) = SensorClock::below_most(receipts, PERIOD_NS) else {
             continue;
         };
@@ -126,7 +109,7 @@ fn add_turns(
         used.extend(others.map(|receipt| receipt.0));
         let by_s = |receipt: Receipt| (receipt.0, -clock.after_ns(receipt) * 1e-9);
         early.extend(ignored.into_iter().map(by_s));
-        clocks.push((*first, clock));
+        clocks.push((receipts[0].0, clock));
     }
     let turn = |&(frame, logged_ns): &Receipt| {
         let later = clocks.partition_point(|(first, _)| *first <= frame);
@@ -200,11 +183,11 @@ fn receipts(
     Err(OpenError::at(list, fault))
 }
 
-fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
-    let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
+fn parse_stamps(path: &Path, text: &str) -> Result<BTreeMap<i64, i64>, OpenError> {
+    let mut stamps = BTreeMap::new();
     let lines = text.lines().enumerate();
     for (line, content) in lines.filter(|(_, content)| !content.trim().is_empty()) {
-        let (frame, ns, digits) = parse_line(content).ok_or_else(|| {
+        let (frame, ns) = parse_line(content).ok_or_else(|| {
             OpenError::Recording(format!(
                 "{}, line {}: {} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040",
                 path.display(),
@@ -212,14 +195,13 @@ fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), 
                 quoted(content)
             ))
         })?;
-        unpadded += usize::from(digits < 9);
         stamps.insert(frame, ns);
     }
-    Ok((stamps, unpadded))
+    Ok(stamps)
 }
 
-/// `Frame: 000248 Time: 1549986609.260809657`: number, ns, digits after the dot.
-fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
+/// `Frame: 000248 Time: 1549986609.260809657`: number, ns.
+fn parse_line(line: &str) -> Option<Receipt> {
     let mut words = line.split_whitespace();
     let (frame, number, time, value) = (words.next()?, words.next()?, words.next()?, words.next()?);
     let (seconds, nanoseconds) = value.split_once('.')?;
@@ -228,7 +210,7 @@ fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
     let seconds: i64 = seconds.parse().ok()?;
     let stamp = seconds.checked_mul(SECOND_NS)?.checked_add(ns)?;
     let labelled = frame == "Frame:" && time == "Time:" && stamp::plausible(stamp);
-    labelled.then_some((number.parse().ok()?, stamp, nanoseconds.len()))
+    labelled.then_some((number.parse().ok()?, stamp))
 }
 
 #[cfg(test)]
@@ -239,9 +221,9 @@ mod tests {
     #[test]
     fn nanoseconds_without_leading_zeros_are_integers() {
         let line = parse_line("Frame: 000243 Time: 1549986608.1533537");
-        assert_eq!(line, Some((243, 1_549_986_608_001_533_537, 7)));
+        assert_eq!(line, Some((243, 1_549_986_608_001_533_537)));
         let line = parse_line("Frame: 1 Time: 1549986608.0");
-        assert_eq!(line, Some((1, 1_549_986_608_000_000_000, 1)));
+        assert_eq!(line, Some((1, 1_549_986_608_000_000_000)));
         for bad in [
             "Frame: 1 Time: 1549986608",
             "Frame: 1 Time: 1549986608.1234567890",
@@ -266,11 +248,11 @@ mod tests {
             let [segment] = &segments(&frames)[..] else {
                 panic!("{off_ns}");
             };
-            assert_eq!(segment.receipts.len(), 19);
+            assert_eq!(segment.len(), 19);
         }
         let mut stalled = received(0..20, 0);
         stalled[7].1 += 1_400_000_000;
-        assert_eq!(segments(&stalled)[0].receipts.len(), 20);
+        assert_eq!(segments(&stalled)[0].len(), 20);
     }
 
     #[test]
@@ -278,7 +260,7 @@ mod tests {
         for pause_ns in [-3_600, 3_600].map(|s| s * SECOND_NS) {
             let frames = [received(0..10, 0), received(10..20, pause_ns)].concat();
             let found = segments(&frames);
-            let sizes: Vec<_> = found.iter().map(|s| (s.first, s.receipts.len())).collect();
+            let sizes: Vec<_> = found.iter().map(|s| (s[0].0, s.len())).collect();
             assert_eq!(sizes, [(0, 10), (10, 10)]);
         }
     }

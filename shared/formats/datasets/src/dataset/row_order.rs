@@ -15,12 +15,9 @@ const BY_TIME: &str = "The files are not named by times of their scans: they are
 const BY_NAME: &str = "The files are not named by times of their scans: they are in the order of their names, \
                        since in the order of the times of their first rows scans would overlap: a clock was set.";
 
-pub(crate) struct RowOrder {
-    /// ns since 1970, increasing unless a clock was set. The time of an unreadable image is
-    /// estimated.
-    pub(crate) starts_ns: Vec<i64>,
-    pub(crate) notes: Vec<String>,
-}
+/// Times of the first rows, ns since 1970, increasing unless a clock was set; that of an unreadable
+/// image is estimated. And sentences on the order.
+type RowOrder = (Vec<i64>, Vec<String>);
 
 /// Orders images by the stamps of their first rows, unless that mixes two clocks, and leaves out
 /// images with a repeated stamp. Does nothing and returns `None` if their names are times of the
@@ -49,8 +46,7 @@ pub(crate) fn order(images: &mut Images, first_image: &FirstImage) -> Option<Row
     let same = image_list::note(&copies, "with the times of other images in the rows");
     images.keep(&indices);
     let notes = [Some(sentence.to_owned()), same].into_iter().flatten();
-    let notes = notes.collect();
-    Some(RowOrder { starts_ns, notes })
+    Some((starts_ns, notes.collect()))
 }
 
 /// Returns the indices of images by their times. One without a time stays behind the one before it.

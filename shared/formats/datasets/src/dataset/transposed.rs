@@ -4,14 +4,14 @@
 use super::detect::Found;
 use super::eccentricity::correct_eccentricity;
 use super::error::{OpenError, ReadError};
-use super::file_list::FileList;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::options::{DatasetOptions, LostAzimuthOption};
 use super::profiles::Profile;
 use super::stale::StaleRows;
-use super::{Dataset, Properties, check_capacity};
+use super::{Dataset, Properties};
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
+use std::path::PathBuf;
 
 /// Side of the blocks of the transposition, pixels: a cache line.
 const BLOCK: usize = 64;
@@ -124,7 +124,7 @@ impl Dataset for TransposedScans {
         &self.properties
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.images.files
     }
 
@@ -143,7 +143,6 @@ impl Dataset for TransposedScans {
         })?;
         let azimuths = self.azimuths();
         let bins = self.images.size.bytes() / azimuths;
-        check_capacity(self.limits(), &slot)?;
         let bytes = &mut slot.bytes[..azimuths * bins];
         // No image is before the first one.
         let before = index.checked_sub(1);

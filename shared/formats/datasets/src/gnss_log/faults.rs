@@ -57,12 +57,6 @@ fn is_zero(count: &usize) -> bool {
 }
 
 impl GnssFaults {
-    pub fn left_out(&self) -> usize {
-        let used = self.out_of_order + self.of_unknown_status + self.too_certain;
-        let all = self.named().iter().map(|(count, _)| count).sum::<usize>();
-        all - used
-    }
-
     pub(super) fn without_usable(&self, all: usize) -> String {
         let named = match self.listed() {
             Some(listed) => format!(" ({listed})"),

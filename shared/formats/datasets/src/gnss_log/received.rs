@@ -53,11 +53,7 @@ impl ReceivedFixes {
         let (raw, is_plane) = rows.map_or((Raw::of(Vec::new()), false), |rows| {
             (rows.raw, rows.columns.is_plane)
         });
-        let (log, error) = GnssLog::examined(raw, is_plane, &self.path);
-        GnssLog {
-            unusable: error.map(|error| error.to_string()),
-            ..log
-        }
+        GnssLog::examined(raw, is_plane, &self.path)
     }
 
     fn appended(&self) -> io::Result<Vec<u8>> {

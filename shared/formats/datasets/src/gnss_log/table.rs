@@ -117,7 +117,8 @@ impl Columns for FixColumns {
         Ok(Self {
             stamp: header.stamp().ok_or_else(|| missing("stamps"))?,
             at: [a, b],
-            signs: signs.map(|sign| header.sign(&[sign]).filter(|_| on_earth.is_some())),
+            signs: signs
+                .map(|sign| Some((header.find(sign.names)?, sign)).filter(|_| on_earth.is_some())),
             is_plane: on_earth.is_none(),
             altitude: header.find(ALTITUDE),
             sigma: sigma.map(|north| (false, [north, east.unwrap_or(north)])),

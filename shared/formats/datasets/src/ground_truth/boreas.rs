@@ -3,7 +3,7 @@
 
 use gyre_geometry::pose;
 
-use super::{LineError, check_increasing, columns, lines, number, stamp_field};
+use super::{LineError, columns, lines, number, stamp_field, stamped};
 use gyre_radar::trajectory::Trajectory;
 
 /// The names of the column of times, in order of precedence.
@@ -16,15 +16,12 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let [time] = columns(header, [time.unwrap_or(TIMES[0])])?;
     let [east, north] = columns(header, ["easting", "northing"])?;
     let [roll, pitch, heading] = columns(header, ["roll", "pitch", "heading"])?;
-    let (mut stamps, mut poses) = (Vec::new(), Vec::new());
-    for (line, row) in rows {
-        let stamp = stamp_field(line, row, time)?;
-        check_increasing(line, &stamps, stamp)?;
+    let (stamps, poses) = stamped(rows, |line, row| {
         let number = |column| number(line, row, column);
         let yaw = forward_heading(number(roll)?, number(pitch)?, number(heading)?);
-        stamps.push(stamp);
-        poses.push(pose(number(east)?, number(north)?, yaw));
-    }
+        let pose = pose(number(east)?, number(north)?, yaw);
+        Ok((stamp_field(line, row, time)?, pose))
+    })?;
     Ok(Trajectory {
         stamp_ns: Some(stamps),
         poses,

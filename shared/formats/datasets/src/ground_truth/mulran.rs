@@ -4,7 +4,7 @@
 use gyre_geometry::{Pose, pose};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{LineError, check_increasing, lines, numbers, stamp_field};
+use super::{LineError, lines, numbers, stamp_field, stamped};
 use gyre_radar::trajectory::Trajectory;
 
 /// Position of the radar in the vehicle frame, m.
@@ -14,14 +14,11 @@ const RADAR_YAW_DEG: f64 = 0.9;
 
 /// Parses poses of the radar. Coordinates of the order of 1e6 m require `f64`.
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
-    let (mut stamps, mut poses) = (Vec::new(), Vec::new());
-    for (line, row) in lines(text) {
+    let (stamps, poses) = stamped(lines(text), |line, row| {
         let stamp = stamp_field(line, row, 0)?;
-        check_increasing(line, &stamps, stamp)?;
         let matrix = numbers::<12>(line, row.split(',').skip(1))?;
-        stamps.push(stamp);
-        poses.push(radar_pose(&matrix));
-    }
+        Ok((stamp, radar_pose(&matrix)))
+    })?;
     Ok(Trajectory {
         stamp_ns: Some(stamps),
         poses,

@@ -5,40 +5,35 @@ use std::io::{self, Write};
 use gyre_geometry::{Pose, pose};
 
 use super::{
-    LineError, check_increasing, lines, numbers,
-    plane::{Matrix, Plane},
+    LineError, lines, numbers,
+    plane::{Matrix, project},
+    stamped,
 };
 use crate::dataset::stamp;
 use gyre_radar::trajectory::Trajectory;
 use gyre_storage::quoted;
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
-    let (mut stamps, mut matrices) = (Vec::new(), Vec::new());
-    for (line, row) in lines(text) {
+    let (stamps, matrices) = stamped(lines(text), |line, row| {
         let seconds = row.split_whitespace().next().unwrap_or_default();
         let stamp = stamp::parse_seconds(seconds).ok_or_else(|| {
             let seconds = quoted(seconds);
             LineError::new(line, format!("time {seconds} is not a number of seconds"))
         })?;
-        check_increasing(line, &stamps, stamp)?;
         let [_, x, y, z, qx, qy, qz, qw] = numbers(line, row.split_whitespace())?;
         let norm = qx * qx + qy * qy + qz * qz + qw * qw;
         if norm < 1e-12 {
             return Err(LineError::new(line, "the quaternion is zero"));
         }
-        stamps.push(stamp);
-        matrices.push(matrix([x, y, z], [qx, qy, qz, qw]));
-    }
-    let plane = Plane::of(&matrices).map_err(|reason| LineError::new(1, reason))?;
+        Ok((stamp, matrix([x, y, z], [qx, qy, qz, qw])))
+    })?;
     // Direction ahead in the plane: correct for any roll and pitch, and for quaternions that are
     // not exactly normalised.
-    let projected = matrices.iter().map(|matrix| {
-        let [x, y, cos, sin] = plane.project(matrix);
-        pose(x, y, sin.atan2(cos))
-    });
+    let projected = project(&matrices)?.into_iter();
+    let poses = projected.map(|[x, y, cos, sin]| pose(x, y, sin.atan2(cos)));
     Ok(Trajectory {
         stamp_ns: Some(stamps),
-        poses: projected.collect(),
+        poses: poses.collect(),
     })
 }
 

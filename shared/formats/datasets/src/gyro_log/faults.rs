@@ -6,6 +6,8 @@ mod order;
 
 use std::path::Path;
 
+use super::SampleLog;
+
 use gyre_radar::median;
 use serde::Serialize;
 
@@ -24,9 +26,6 @@ const GAP_PERIODS: f64 = 3.0 + 1e-6;
 
 const SPREAD: &str = "samples come in bursts of one stamp: spread evenly back to the burst before.";
 const MEASURED_TWICE: &str = "samples are of times over which the clock was set back, and which have two measurements: left out.";
-
-/// Counters of 32 bits overflow after so long, if they count ns, µs or ms, s.
-const OVERFLOWS_S: [f64; 3] = [4.294967296, 4294.967296, 4294967.296];
 
 /// Faults of a log. Its samples do not include the ones counted as left out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -69,28 +68,13 @@ pub struct LogGap {
 }
 
 impl LogFaults {
-    pub fn left_out(&self) -> usize {
-        self.unreadable
-            + self.not_a_number
-            + self.absurd
-            + self.repeated
-            + self.measured_twice
-            + self.by_clock_steps
-    }
-
     /// Returns how the clock steps, and where first: without a full stop.
     pub fn clock_steps(&self) -> String {
         let (count, first) = (self.clock_steps_s.len(), self.first_clock_step);
         let steps = self.clock_steps_s.iter().take(5);
         let steps: Vec<String> = steps.map(|step| format!("{step:+.6} s")).collect();
-        let is_near = |step: f64, it: &f64| (step.abs() - it).abs() < 1e-3 * it;
-        let wraps = |step: &f64| OVERFLOWS_S.iter().any(|it| is_near(*step, it));
-        let counter = match self.clock_steps_s.iter().any(wraps) {
-            true => ", as a counter of 32 bits that overflows: write stamps of 64 bits",
-            false => "",
-        };
         let steps = steps.join(", ");
-        format!("The clock steps {count} times ({steps}), first behind sample {first}{counter}")
+        format!("The clock steps {count} times ({steps}), first behind sample {first}")
     }
 
     /// Returns a sentence for each kind of fault of the log of a sensor.
@@ -171,7 +155,7 @@ pub(crate) fn examine(
     unit_is_assumed: bool,
     path: &Path,
     plausible: &Plausible,
-) -> Result<(Vec<Sample>, LogFaults), LogError> {
+) -> Result<SampleLog, LogError> {
     let unusable = |reason: String| LogError::unusable(plausible.of.section(), path, reason);
     let mut faults = LogFaults {
         unreadable: raw.unreadable.count,
@@ -206,7 +190,11 @@ pub(crate) fn examine(
         return Err(unusable("it has no samples".to_owned()));
     }
     (faults.gaps, faults.bridged) = gaps(&samples);
-    Ok((samples, faults))
+    Ok(SampleLog {
+        samples,
+        faults,
+        path: path.to_owned(),
+    })
 }
 
 /// Times without samples, of samples in the order of their stamps, and the number of samples that

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{InspectedLogs, Report, timing::Timing};
-use crate::{Dataset, GnssLog, GyroLog, LogError, WheelLog};
+use crate::{Dataset, GnssLog, LogError, SampleLog};
 
 /// The duration of the quietest time of the gyro, s.
 const QUIET_S: f64 = 5.0;
@@ -31,7 +31,7 @@ pub(super) fn examine(
 
 fn gyro(report: &mut Report, timing: Option<&Timing>) {
     let words = ["gyro", "a gyro"];
-    let file = match GyroLog::find(&report.root) {
+    let file = match SampleLog::find_gyro(&report.root) {
         Ok(file) => file,
         Err(LogError::InTruth { path }) => {
             let why =
@@ -40,7 +40,7 @@ fn gyro(report: &mut Report, timing: Option<&Timing>) {
         }
         Err(_) => return,
     };
-    let log = match GyroLog::read(&file) {
+    let log = match SampleLog::read_gyro(&file) {
         Ok(log) => log,
         Err(error) => return unusable(report, words, &file, &error.to_string()),
     };
@@ -74,11 +74,11 @@ fn gyro(report: &mut Report, timing: Option<&Timing>) {
 }
 
 fn wheels(report: &mut Report, m_per_tick: Option<f64>, timing: Option<&Timing>) {
-    let Ok(file) = WheelLog::find(&report.root) else {
+    let Ok(file) = SampleLog::find_wheels(&report.root) else {
         return;
     };
     let name = report.name_of(&file);
-    let log = match WheelLog::read(&file, m_per_tick) {
+    let log = match SampleLog::read_wheels(&file, m_per_tick) {
         Ok(log) => log,
         Err(error) => {
             return unusable(report, ["wheels", "the wheels"], &file, &error.to_string());

@@ -8,7 +8,7 @@ use gyre_samples::{Sample, SampleKind};
 
 use super::{OF, SPEEDS};
 use crate::{
-    LogError, LogFaults,
+    LogError, SampleLog,
     gyro_log::faults::{ABSURD_SHARE, Plausible, examine},
     header::{Header, Stamp},
     table::{Columns, Rows},
@@ -45,7 +45,7 @@ impl Columns for CountColumns {
     type Entry = Sample;
 
     fn by_names(header: &Header) -> Result<Self, String> {
-        if header.sign(&super::SIGNS).is_some() {
+        if header.find(super::DIRECTIONS).is_some() {
             return Err("its direction is not applied to counts".to_owned());
         }
         let one = |all: &[&str]| all.iter().find_map(|name| Some(vec![header.find(name)?]));
@@ -79,7 +79,7 @@ pub(super) fn speeds(
     rows: Rows<CountColumns>,
     path: &Path,
     m_per_tick: Option<f64>,
-) -> Result<(Vec<Sample>, LogFaults), LogError> {
+) -> Result<SampleLog, LogError> {
     let unusable = |reason: &str| LogError::unusable(OF, path, reason);
     let is_in_ticks = rows.columns.is_in_ticks;
     let missing = "it counts ticks: give the distance of one, in metres, as wheels.m_per_tick";
@@ -87,11 +87,11 @@ pub(super) fn speeds(
         true => m_per_tick.ok_or_else(|| unusable(missing))?,
         false => 1.0,
     };
-    let (mut counts, mut faults) = examine(rows.raw, false, path, &COUNTS)?;
-    (0..2).for_each(|wheel| count_on(&mut counts, wheel));
-    let mut speeds = Vec::with_capacity(counts.len());
-    let mut from = counts[0];
-    for to in &counts {
+    let mut log = examine(rows.raw, false, path, &COUNTS)?;
+    (0..2).for_each(|wheel| count_on(&mut log.samples, wheel));
+    let mut speeds = Vec::with_capacity(log.samples.len());
+    let mut from = log.samples[0];
+    for to in &log.samples {
         let span_ns = to.stamp_ns - from.stamp_ns;
         if span_ns >= SPAN_NS {
             let by = |wheel: usize| to.values[wheel] - from.values[wheel];
@@ -115,8 +115,9 @@ pub(super) fn speeds(
         let reason = format!("{absurd} of its {before} speeds are beyond 100 m/s: {remedy}");
         return Err(unusable(&reason));
     }
-    faults.absurd += absurd;
-    Ok((speeds, faults))
+    log.faults.absurd += absurd;
+    log.samples = speeds;
+    Ok(log)
 }
 
 /// Unwraps a counter that overflows. The range of the counter is a power of two, or the size of

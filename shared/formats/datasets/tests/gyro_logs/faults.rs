@@ -1,5 +1,6 @@
 //! Faults of logs: none of them changes a sample in silence.
 
+use gyre_datasets::LogFaults;
 use gyre_samples::SampleKind;
 use proptest::prelude::*;
 
@@ -18,6 +19,11 @@ fn rows(count: i64) -> Vec<(i64, f64)> {
 fn text(rows: &[(i64, f64)]) -> String {
     let rows = rows.iter().map(|(ns, rate)| format!("{ns},0,0,{rate}\n"));
     format!("{HEADER}\n{}", rows.collect::<String>())
+}
+
+fn left_out(of: &LogFaults) -> usize {
+    let by_value = of.unreadable + of.not_a_number + of.absurd;
+    by_value + of.repeated + of.measured_twice + of.by_clock_steps
 }
 
 /// One fault that is put into a log.
@@ -107,7 +113,7 @@ proptest! {
         let Ok(log) = read("imu.csv", &text(&rows)) else { return Ok(()) };
         prop_assert!(log.samples.windows(2).all(|pair| pair[0].stamp_ns < pair[1].stamp_ns));
         prop_assert!(log.samples.iter().all(|it| it.values.iter().all(|value| value.abs() <= 10.0)));
-        prop_assert_eq!(log.samples.len() + log.faults.left_out(), rows.len());
+        prop_assert_eq!(log.samples.len() + left_out(&log.faults), rows.len());
     }
 }
 
@@ -219,8 +225,6 @@ fn stamps_that_are_no_clock_are_refused_with_the_steps() {
         for words in [words, "first behind sample 2"] {
             assert!(refused.contains(words), "{refused}");
         }
-        let is_counter = refused.contains("a counter of 32 bits");
-        assert_eq!(is_counter, step_ns == 1 << 32, "{refused}");
     }
 }
 
@@ -241,7 +245,7 @@ fn samples_that_come_in_bursts_are_spread_back_to_the_burst_before() {
         let log = read("imu.csv", &text(&rows)).unwrap();
         let found: Vec<i64> = log.samples.iter().map(|it| it.stamp_ns).collect();
         assert_eq!(found, measured, "{size}");
-        assert_eq!((log.faults.spread, log.faults.left_out()), (rows.len(), 0));
+        assert_eq!((log.faults.spread, left_out(&log.faults)), (rows.len(), 0));
         let sentence = &log.faults.sentences(SampleKind::Gyro)[0];
         assert!(sentence.contains("in bursts of one stamp"), "{sentence}");
     }

@@ -1,6 +1,6 @@
 //! Formats.
 
-use gyre_datasets::{Format, GyroLog};
+use gyre_datasets::{Format, SampleLog};
 use gyre_samples::{SampleKind, UpAxis};
 use tempfile::TempDir;
 
@@ -8,7 +8,7 @@ use super::{START_NS, read};
 use crate::common::{assert_refused, written};
 
 /// The rates and accelerations of the only sample.
-fn values(log: &GyroLog) -> [f64; 6] {
+fn values(log: &SampleLog) -> [f64; 6] {
     let [sample] = &log.samples[..] else {
         panic!("{log:?}");
     };
@@ -89,9 +89,9 @@ fn samples_of_radiate_are_files() {
         );
         written(&folder, &format!("GPS_IMU_Twist/{number:06}.txt"), &text);
     }
-    let found = GyroLog::find(folder.path()).unwrap();
+    let found = SampleLog::find_gyro(folder.path()).unwrap();
     assert_eq!(found, folder.path().join("GPS_IMU_Twist"));
-    let log = GyroLog::read(&found).unwrap();
+    let log = SampleLog::read_gyro(&found).unwrap();
     let stamps: Vec<i64> = log.samples.iter().map(|sample| sample.stamp_ns).collect();
     let expected = [1_153_537, 53_153_537].map(|ns| 1_549_986_608_000_000_000 + ns);
     assert_eq!(stamps, expected);
@@ -115,7 +115,7 @@ fn the_axis_that_points_up_is_configured_or_measured_or_that_of_the_format() {
     ] {
         let header = "stamp_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
         let text = format!("{header}\n{START_NS},0,0,0.1,{accelerations}\n");
-        let log = GyroLog::read(&written(&folder, name, &text)).unwrap();
+        let log = SampleLog::read_gyro(&written(&folder, name, &text)).unwrap();
         let up = log.up(configured, dataset);
         assert_eq!(up.ok(), expected, "{name} {accelerations} {configured:?}");
     }
@@ -131,7 +131,7 @@ fn logs_lie_at_the_places_of_the_datasets() {
     ] {
         let folder = TempDir::new().unwrap();
         let path = written(&folder, place, "");
-        let beside = |name: &str| GyroLog::find(&folder.path().join(name)).ok();
+        let beside = |name: &str| SampleLog::find_gyro(&folder.path().join(name)).ok();
         assert_eq!(beside(""), Some(path.clone()), "{place}");
         // The folder of the images may be given for the dataset.
         assert_eq!(beside("radar"), Some(path), "{place}");
@@ -144,7 +144,7 @@ fn the_log_of_the_truth_is_used_only_if_it_is_named() {
     let folder = TempDir::new().unwrap();
     written(&folder, "applanix/imu.csv", "");
     let reason = "of which the ground truth was computed";
-    assert_refused(GyroLog::find(folder.path()), reason);
+    assert_refused(SampleLog::find_gyro(folder.path()), reason);
 }
 
 #[test]
@@ -158,9 +158,9 @@ fn what_is_no_log_of_a_gyro_is_refused_with_the_reason() {
         "1,2,3,4,5,6,7\n|its 7 columns have no names",
         "1,2,3,4,5,6,7,8\n|first version of MulRan's xsens_imu.csv",
         "stamp_ns,gyro_x,gyro_y,gyro_z\n|it has no samples",
-        "stamp_ns;gyro_x;gyro_y;gyro_z\n1;0,1;0,2;0,3\n|the first in line 2: \"0,1\" has a decimal comma: write decimal points",
+        "stamp_ns;gyro_x;gyro_y;gyro_z\n1;0,1;0,2;0,3\n|the first in line 2: in \"1; 0,1; 0,2; 0,3\", write stamps as seconds or nanoseconds since 1970, numbers with decimal points",
         "stamp_ns,gyro_x,gyro_y,gyro_z\n1;0.1;0.2;0.3\n|it has 1 fields in place of 4: do all rows have the mark",
-        "time,gyro_x,gyro_y,gyro_z\n2025-10-14T15:41:25.551Z,0,0,0\n|\"2025-10-14T15:41:25.551Z\" is a date or a time of day: write stamps as",
+        "time,gyro_x,gyro_y,gyro_z\n2025-10-14T15:41:25.551Z,0,0,0\n|in \"2025-10-14T15:41:25.551Z; 0; 0; 0\", write stamps as seconds",
     ] {
         let (text, reason) = case.split_once('|').unwrap();
         assert_refused(read("imu.csv", text), reason);
@@ -171,6 +171,6 @@ fn what_is_no_log_of_a_gyro_is_refused_with_the_reason() {
         "stamp_ns,gyro_x,gyro_y,gyro_z,angular_velocity_covariance_0\n1,0,0,0,-1\n3,0,0,0,0\n";
     let log = read("imu.csv", stated).unwrap();
     assert_eq!((log.samples.len(), log.faults.not_a_number), (1, 1));
-    let missing = GyroLog::read("/no/imu.csv".as_ref());
+    let missing = SampleLog::read_gyro("/no/imu.csv".as_ref());
     assert_refused(missing, "cannot read the log of the gyro /no/imu.csv");
 }

@@ -5,7 +5,7 @@ mod faults;
 mod formats;
 mod wheels;
 
-use gyre_datasets::{GyroLog, LogError};
+use gyre_datasets::{LogError, SampleLog};
 use tempfile::TempDir;
 
 use crate::common::written;
@@ -14,8 +14,8 @@ use crate::common::written;
 const START_NS: i64 = 1_760_456_485_551_626_000;
 
 /// Reads a text as a file of this name.
-fn read(name: &str, text: &str) -> Result<GyroLog, LogError> {
+fn read(name: &str, text: &str) -> Result<SampleLog, LogError> {
     let folder = TempDir::new().unwrap();
     let path = written(&folder, name, text);
-    GyroLog::read(&path)
+    SampleLog::read_gyro(&path)
 }

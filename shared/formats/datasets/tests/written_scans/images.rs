@@ -3,8 +3,8 @@
 use std::f32::consts::TAU;
 use std::fs;
 
-use gyre_datasets::{DatasetOptions, Format, ReadError, open, reopen};
-use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_datasets::{DatasetOptions, Format, open, reopen};
+use gyre_radar::OwnedScan;
 
 use super::{assert_rejected, first_scan, folder, opened};
 use crate::common::{
@@ -58,7 +58,7 @@ fn a_dataset_that_is_opened_again_has_the_scans_that_it_had() {
         let root = folder();
         let files = write(root.path(), 4);
         let dataset = opened(root.path());
-        let (format, listed) = (dataset.format(), dataset.files().clone());
+        let (format, listed) = (dataset.format(), dataset.files().to_vec());
         let none = DatasetOptions::default();
         fs::rename(&files[1], files[1].with_file_name("000000.png")).unwrap();
         let mut again = reopen(root.path(), &none, format, listed).unwrap();
@@ -197,22 +197,6 @@ fn an_oversized_header_allocates_no_memory() {
     bytes[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
     fs::write(&files[0], bytes).unwrap();
     assert_rejected(root.path(), "is too large for a radar scan");
-}
-
-#[test]
-fn a_slot_that_is_too_small_is_rejected() {
-    let root = folder();
-    write_oxford(root.path(), 1);
-    write_radiate(&root.path().join("transposed"), 1);
-    for path in [root.path().to_owned(), root.path().join("transposed")] {
-        let mut dataset = opened(&path);
-        let ScanLimits { bytes, azimuths } = dataset.limits();
-        for (bytes, azimuths) in [(bytes - 1, azimuths), (bytes, azimuths - 1)] {
-            let mut scan = OwnedScan::with_limits(ScanLimits { bytes, azimuths });
-            let refused = dataset.read(0, scan.slot());
-            assert!(matches!(refused, Err(ReadError::SlotTooSmall { .. })));
-        }
-    }
 }
 
 #[test]

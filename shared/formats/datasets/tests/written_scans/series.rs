@@ -41,7 +41,7 @@ fn images_that_are_not_named_by_times_are_in_the_order_of_their_rows_times() {
             let mut dataset = open(&images, &options).unwrap();
             assert_eq!(names(dataset.as_ref()), expected, "{format}");
             assert_eq!(dataset.period_ns(), PERIOD_US * 1000);
-            let again = reopen(&images, &options, format, dataset.files().clone()).unwrap();
+            let again = reopen(&images, &options, format, dataset.files().to_vec()).unwrap();
             for index in 0..5 {
                 let stamp_ns = read(dataset.as_mut(), index).unwrap().geometry.stamp_ns;
                 let middle_ns = (START_US + index as i64 * PERIOD_US + 122_000) * 1000;
@@ -74,7 +74,7 @@ fn a_clock_that_is_set_back_breaks_the_time_of_numbered_images_once() {
         assert_eq!(dataset.period_ns(), PERIOD_US * 1000);
         let notes = dataset.notes().join(" ");
         assert!(notes.contains("in the order of their names"), "{notes}");
-        let again = reopen(&images, &options, format, dataset.files().clone()).unwrap();
+        let again = reopen(&images, &options, format, dataset.files().to_vec()).unwrap();
         let times: Vec<_> = (0..40).map(|k| again.nominal_stamp_ns(k)).collect();
         let back: Vec<_> = (1..40).filter(|k| times[*k] < times[k - 1]).collect();
         assert_eq!((names(again.as_ref()), back), (expected.clone(), vec![20]));

@@ -1,10 +1,11 @@
 //! Messages as azimuths.
 
-use gyre_colossus::{Azimuth, Configuration};
+use gyre_colossus::Azimuth;
 use gyre_ros2_messages::{
     Ros2Message, decode,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    radar::DescribedRadar,
     sensor_msgs::Image,
 };
 
@@ -13,38 +14,22 @@ use crate::bags::{
     topics::{Form, Kind},
 };
 
-/// The description that a radar gives of itself, and by how many rows its driver turns images.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Described {
-    pub radar: Configuration,
-    pub azimuth_offset: u16,
-}
-
-pub(crate) fn described(form: Form, message: &Message) -> Result<Described, String> {
-    let (radar, azimuth_offset) = match form {
-        Form::Numbers => {
-            let message: RadarConfigurationMsg = of(message)?;
-            (message.configuration(), message.azimuth_offset)
-        }
-        Form::Bytes => {
-            let message: RadarConfigurationMessage = of(message)?;
-            (message.configuration(), 0)
-        }
+pub(crate) fn described(form: Form, message: &Message) -> Result<DescribedRadar, String> {
+    let described = match form {
+        Form::Numbers => of::<RadarConfigurationMsg>(message)?.configuration(),
+        Form::Bytes => of::<RadarConfigurationMessage>(message)?.configuration(),
     };
-    Ok(Described {
-        radar: radar.map_err(|e| e.to_string())?,
-        azimuth_offset,
-    })
+    described.map_err(|e| e.to_string())
 }
 
 /// Calls `each` with the azimuths in a message of a scan topic and their receive times, ns.
 pub(crate) fn azimuths(
     kind: Kind,
     message: &Message,
-    described: &Described,
+    described: &DescribedRadar,
     mut each: impl FnMut(Azimuth<'_>, i64),
 ) -> Result<(), String> {
-    let Described {
+    let DescribedRadar {
         radar,
         azimuth_offset,
     } = described;

@@ -6,11 +6,12 @@ use std::{
 };
 
 use gyre_datasets::DatasetOptions;
+use gyre_ros2_messages::radar::DescribedRadar;
 
 use crate::{
     bags::{
         Channel, McapFile, Message, RecordingError,
-        azimuths::{Described, described},
+        azimuths::described,
         files::{Files, compressed},
         radar::{ENCODER_COUNTS, Survey},
         spans::{TimedSpan, spans},
@@ -19,7 +20,7 @@ use crate::{
     file::{Span, Times, joined},
 };
 
-type OwnDescription = Result<Described, String>;
+type OwnDescription = Result<DescribedRadar, String>;
 
 pub(crate) struct Bag {
     path: PathBuf,
@@ -161,44 +162,43 @@ impl Bag {
         &mut self,
         topics: &Topics,
         options: &DatasetOptions,
-    ) -> Result<(Described, String), RecordingError> {
+    ) -> Result<(DescribedRadar, String), RecordingError> {
         let (survey, own) = self.survey(topics)?;
-        let usual = match &own {
-            Some(Ok(own)) => own.radar.encoder_size,
-            _ => ENCODER_COUNTS,
+        let (said, refused) = match own {
+            Some(Ok(own)) => (Some(own), None),
+            Some(Err(reason)) => (None, Some(reason)),
+            None => (None, None),
         };
-        let is_own = matches!(own, Some(Ok(_)));
-        let said = if is_own { " as it says" } else { "" };
-        let shown = survey.other_counts(usual, is_own);
-        let (size, counts) = match (options.encoder_counts, shown) {
-            (Some(size), _) => (size, " as configured".to_owned()),
-            (None, Some(size)) => {
-                let step =
-                    "with these the step from the last azimuth to the first is as the others";
-                (size, format!(", not {usual}{said}: {step}"))
-            }
-            (None, None) if is_own => (usual, " as it says too".to_owned()),
-            (None, None) => (usual, " as most radars have".to_owned()),
+        let usual = said.map_or(ENCODER_COUNTS, |own| own.radar.encoder_size);
+        let shown = survey.other_counts(usual, said.is_some());
+        let size = options.encoder_counts.or(shown).unwrap_or(usual);
+        let counts = match (options.encoder_counts, shown) {
+            (Some(_), _) => " as configured".to_owned(),
+            (None, Some(_)) => format!(
+                ", not {usual}: with these the step from the last azimuth to the first is as the others"
+            ),
+            (None, None) if said.is_some() => " as it says too".to_owned(),
+            (None, None) => " as most radars have".to_owned(),
         };
         let resolution_m = options.range_resolution_m;
-        let ((mut described, before), after) = match own {
-            Some(Ok(own)) => ((own, ", ".to_owned()), "as the radar says of itself"),
-            Some(Err(reason)) if resolution_m.is_none() => {
+        let (mut described, before, after) = match (said, refused) {
+            (Some(own), _) => (own, ", ".to_owned(), "as the radar says of itself"),
+            (None, Some(reason)) if resolution_m.is_none() => {
                 let reason = format!(
                     "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
                      dataset.range_resolution_m"
                 );
                 return Err(RecordingError::unreadable(&self.path, reason));
             }
-            refused => {
-                let before = match refused.and_then(Result::err) {
+            (None, refused) => {
+                let before = match refused {
                     Some(reason) => {
-                        format!("what the radar says of itself cannot be used ({reason})")
+                        format!("; what the radar says of itself cannot be used ({reason}): ")
                     }
-                    None => "the radar does not describe itself in the bag".to_owned(),
+                    None => "; the radar does not describe itself in the bag: ".to_owned(),
                 };
                 let described = survey.describe(&self.path, resolution_m, size)?;
-                ((described, format!("; {before}: ")), "are as found")
+                (described, before, "are as found")
             }
         };
         let radar = &mut described.radar;

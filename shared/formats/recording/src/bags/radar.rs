@@ -7,12 +7,13 @@ use gyre_datasets::{EncoderTurn, FIRST_TURNS, encoder_counts, turn_ns};
 use gyre_ros2_messages::{
     messages::RadarFftDataMessage,
     navtech_msgs::{RadarBScanMsg, RadarFftDataMsg},
+    radar::DescribedRadar,
     sensor_msgs::Image,
 };
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::{Described, of},
+    azimuths::of,
     topics::{Form, Kind},
 };
 
@@ -92,7 +93,7 @@ impl Survey {
         path: &Path,
         range_resolution_m: Option<f32>,
         encoder_size: u16,
-    ) -> Result<Described, RecordingError> {
+    ) -> Result<DescribedRadar, RecordingError> {
         let azimuths = self.azimuths(encoder_size);
         let (range_resolution_m, azimuths) = match (range_resolution_m, azimuths) {
             (Some(range_resolution_m), Some(azimuths)) => (range_resolution_m, azimuths),
@@ -108,7 +109,7 @@ impl Survey {
         };
         let bins = self.samples.iter().map(|sample| sample.bins).max();
         let small = |number: usize| u16::try_from(number).unwrap_or(u16::MAX);
-        Ok(Described {
+        Ok(DescribedRadar {
             radar: Configuration {
                 azimuth_samples: small(azimuths),
                 range_in_bins: small(bins.unwrap_or_default()),
@@ -143,8 +144,8 @@ impl Survey {
         }
         let unit_ns = unit_ns.unwrap_or(1);
         let turn = |rows: &&[RowShown]| {
-            let counts = rows.iter().map(|(count, _)| *count).collect();
-            EncoderTurn::new(counts, |row| rows.get(row)?.1.checked_mul(unit_ns))
+            let counts: Vec<u16> = rows.iter().map(|(count, _)| *count).collect();
+            EncoderTurn::new(&counts, |row| rows.get(row)?.1.checked_mul(unit_ns))
         };
         let turns: Vec<EncoderTurn> = whole.iter().map(turn).collect();
         // The last step of a turn may differ.

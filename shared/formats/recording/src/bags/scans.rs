@@ -10,15 +10,16 @@ use std::{
 
 use gyre_colossus::{Azimuth, SweepAssembler};
 use gyre_datasets::{
-    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
-    OpenError, Properties, ReadError, check_capacity, turn_ns,
+    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError,
+    Properties, ReadError, turn_ns,
 };
 use gyre_radar::{ScanSlot, SweepGeometry};
+use gyre_ros2_messages::radar::DescribedRadar;
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::{Described, azimuths},
+    azimuths::azimuths,
     bag::{Bag, Key},
     files::{Files, files},
     fixes, samples,
@@ -35,12 +36,11 @@ pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, O
 pub fn reopen(
     path: &Path,
     options: &DatasetOptions,
-    files: &FileList,
+    files: Vec<PathBuf>,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
-    let paths = (0..files.len()).filter_map(|index| files.get(index));
     let files = Files {
-        paths: paths.map(Path::to_owned).collect(),
+        paths: files,
         are_in_order: true,
     };
     open_files(path, &files, options)
@@ -52,12 +52,9 @@ fn open_files(
     options: &DatasetOptions,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     if options.azimuth_source == Some(AzimuthSource::Uniform) {
-        return Err(OpenError::BadOption {
-            key: "azimuth_source",
-            value: "uniform".to_owned(),
-            format: Some(Format::Ros2Bag),
-            reason: "its azimuths are those of the encoder; leave the key out",
-        });
+        let (format, key) = (Some(Format::Ros2Bag), "azimuth_source");
+        let reason = "its azimuths are those of the encoder; leave the key out";
+        return Err(OpenError::option(format, key, "uniform", reason));
     }
     Ok(Box::new(Scans::open(path, files, options)?))
 }
@@ -70,10 +67,10 @@ struct Scans {
     properties: Properties,
     bag: Bag,
     topics: Topics,
-    described: Described,
+    described: DescribedRadar,
     options: DatasetOptions,
     index: Index,
-    files: FileList,
+    files: Vec<PathBuf>,
     /// The spans that were read last, and their messages of scans.
     kept: (Option<RangeInclusive<u32>>, BTreeMap<Key, Message>),
 }
@@ -134,15 +131,6 @@ impl Scans {
         Ok(())
     }
 
-    fn why_damaged(&mut self, entry: &Entry) -> Result<String, RecordingError> {
-        self.keep(&entry.spans)?;
-        let message = self.kept.1.get(&entry.start.message);
-        let decoded = message
-            .map(|message| azimuths(self.topics.scans.kind, message, &self.described, |_, _| {}));
-        let reason = decoded.and_then(Result::err);
-        Ok(reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned()))
-    }
-
     fn assemble(
         &mut self,
         index: usize,
@@ -170,7 +158,7 @@ impl Scans {
                 }
                 for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
                     if found.is_none() {
-                        found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
+                        found = assembler.add(&azimuth, stamp_ns, &mut slot);
                     }
                 }
             };
@@ -184,21 +172,12 @@ impl Scans {
     }
 }
 
-fn reborrow<'a>(slot: &'a mut ScanSlot<'_>) -> ScanSlot<'a> {
-    ScanSlot {
-        bytes: slot.bytes,
-        azimuth_rad: slot.azimuth_rad,
-        stamp_ns: slot.stamp_ns,
-        flags: slot.flags,
-    }
-}
-
 impl Dataset for Scans {
     fn properties(&self) -> &Properties {
         &self.properties
     }
 
-    fn files(&self) -> &FileList {
+    fn files(&self) -> &[PathBuf] {
         &self.files
     }
 
@@ -232,11 +211,9 @@ impl Dataset for Scans {
         let len = self.len();
         let entry = self.index.entries.get(index).cloned();
         let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
-        check_capacity(self.limits(), &slot)?;
         let path = self.file(index).to_owned();
         let failed = |error: RecordingError| error.of_scan(&path);
-        if entry.is_damaged {
-            let reason = self.why_damaged(&entry).map_err(failed)?;
+        if let Some(reason) = &entry.damage {
             return Err(ReadError::Scan(format!(
                 "the message of scan {index} in {} cannot be decoded: {reason}",
                 path.display()

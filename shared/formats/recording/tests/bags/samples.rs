@@ -1,6 +1,6 @@
 //! Samples of inertial sensors and of wheels in bags.
 
-use gyre_datasets::GyroLog;
+use gyre_datasets::SampleLog;
 use gyre_ros2_messages::{
     geometry_msgs::{TwistStamped, Vector3},
     sensor_msgs::Imu,
@@ -78,7 +78,7 @@ fn a_driver_without_stamps_has_the_times_of_receipt_and_messages_without_rates_a
     }
     let mut dataset = opened(&folder.bag(&messages));
     let samples = of_gyro(dataset.as_mut(), None).unwrap().unwrap();
-    let log = GyroLog::of(samples, &folder.path("bag")).unwrap();
+    let log = SampleLog::of_gyro(samples, &folder.path("bag")).unwrap();
     assert_eq!((log.samples.len(), log.faults.not_a_number), (1, 3));
 }
 

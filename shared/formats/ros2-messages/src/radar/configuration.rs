@@ -19,9 +19,16 @@ const DEPTHS_M: RangeInclusive<f64> = 1e-3..=5.0;
 /// s, or as quickly.
 const MAX_TURNS_PER_S: u16 = 50;
 
+/// The description that a radar gives of itself, and by how many rows its driver turns images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DescribedRadar {
+    pub radar: Configuration,
+    pub azimuth_offset: u16,
+}
+
 impl RadarConfigurationMsg {
-    pub fn configuration(&self) -> Result<Configuration, BadMessage> {
-        Ok(Configuration {
+    pub fn configuration(&self) -> Result<DescribedRadar, BadMessage> {
+        let radar = Configuration {
             azimuth_samples: self.azimuth_samples,
             range_in_bins: self.range_in_bins,
             encoder_size: self.encoder_size,
@@ -29,6 +36,10 @@ impl RadarConfigurationMsg {
             range_gain: self.range_gain,
             range_offset: self.range_offset,
             ..of_depth(resolution_m::<Self>(self.bin_size.into())?)
+        };
+        Ok(DescribedRadar {
+            radar,
+            azimuth_offset: self.azimuth_offset,
         })
     }
 
@@ -50,17 +61,21 @@ impl RadarConfigurationMsg {
 }
 
 impl RadarConfigurationMessage {
-    pub fn configuration(&self) -> Result<Configuration, BadMessage> {
+    pub fn configuration(&self) -> Result<DescribedRadar, BadMessage> {
         let short = |field, bytes: &[u8]| number::<Self, 2>(field, bytes).map(u16::from_be_bytes);
         // Unlike the others: the driver copies the double as its computer has it.
         let bin_size = f64::from_le_bytes(number::<Self, 8>("bin_size", &self.bin_size)?);
         let rate = short("expected_rotation_rate", &self.expected_rotation_rate)?;
-        Ok(Configuration {
+        let radar = Configuration {
             azimuth_samples: short("azimuth_samples", &self.azimuth_samples)?,
             range_in_bins: short("range_in_bins", &self.range_in_bins)?,
             encoder_size: short("encoder_size", &self.encoder_size)?,
             rotation_mhz: rotation_mhz(rate),
             ..of_depth(resolution_m::<Self>(bin_size)?)
+        };
+        Ok(DescribedRadar {
+            radar,
+            azimuth_offset: 0,
         })
     }
 }

@@ -9,10 +9,11 @@ use std::{
 
 use gyre_colossus::{Azimuth, Counters, FoundClock, RadarClock, SweepAssembler};
 use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_ros2_messages::radar::DescribedRadar;
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::{Described, azimuths},
+    azimuths::azimuths,
     bag::{Bag, Key},
     topics::{Kind, Topics},
 };
@@ -36,8 +37,8 @@ pub(super) struct Entry {
     pub spans: RangeInclusive<u32>,
     pub stamp_ns: i64,
     pub logged_ns: i64,
-    /// A whole turn in a message that cannot be decoded.
-    pub is_damaged: bool,
+    /// Why the message of a whole turn cannot be decoded.
+    pub damage: Option<String>,
 }
 
 pub(super) struct Index {
@@ -59,7 +60,7 @@ impl Index {
     pub fn of(
         bag: &mut Bag,
         topics: &Topics,
-        described: &Described,
+        described: &DescribedRadar,
         assembler: SweepAssembler,
     ) -> Result<Self, RecordingError> {
         let mut indexing = Indexing::new(topics.scans.kind, described, assembler);
@@ -81,25 +82,14 @@ impl Index {
 
     /// Returns why no scan on a topic can be read; `None` if one can be.
     pub fn why_none_can_be_read(&self, topic: &str) -> Option<String> {
-        if self.entries.iter().any(|entry| !entry.is_damaged) {
-            return None;
-        }
-        let (lost, azimuths) = (&self.counters, self.azimuths);
-        let (invalid, incomplete) = (lost.invalid_azimuths, lost.incomplete_sweeps);
-        Some(match &self.first_damage {
-            Some(reason) if azimuths == 0 => {
-                format!("has messages on {topic}, of which none can be decoded: {reason}")
-            }
-            _ if azimuths == 0 => format!("has no messages on {topic} that can be read"),
-            _ if lost.broken_sweeps > 0 => format!(
-                "has {azimuths} azimuths on {topic}, but their times do not advance as the radar turns, by its encoder and its rotation"
-            ),
-            _ if invalid > 0 => format!(
-                "has {azimuths} azimuths on {topic}, of which {invalid} have encoder values beyond a turn: set dataset.encoder_counts"
-            ),
-            _ => format!(
-                "has no complete turn of the radar on {topic}: {azimuths} azimuths, {incomplete} turns of which more than half is missing"
-            ),
+        let can_be = self.entries.iter().any(|entry| entry.damage.is_none());
+        let notes: Vec<String> = self.notes();
+        let notes: Vec<&str> = notes.iter().map(|it| it.trim_end_matches('.')).collect();
+        let (azimuths, notes) = (self.azimuths, notes.join("; "));
+        (!can_be).then(|| {
+            format!(
+                "has no complete turn of the radar on {topic} that can be read, and {azimuths} azimuths: {notes}"
+            )
         })
     }
 
@@ -123,11 +113,11 @@ impl Index {
             ),
             (
                 lost.incomplete_sweeps + lost.broken_sweeps,
-                "turns are left out: more than half of their azimuths are missing, or the radar's clock was set.",
+                "turns are left out: more than half of their azimuths are missing, or their times do not advance as the radar turns, as where its clock was set.",
             ),
             (
                 lost.repeated_azimuths + lost.invalid_azimuths + lost.surplus_azimuths,
-                "azimuths are left out: they have the encoder value of the one before, or one beyond a turn, or are more than the radar has.",
+                "azimuths are left out: they have the encoder value of the one before, or one beyond a turn (dataset.encoder_counts), or are more than the radar has.",
             ),
             (
                 lost.cut_rows,
@@ -142,7 +132,7 @@ impl Index {
 
 struct Indexing {
     kind: Kind,
-    described: Described,
+    described: DescribedRadar,
     clock: RadarClock,
     found: Option<FoundClock>,
     assembler: SweepAssembler,
@@ -158,7 +148,7 @@ struct Indexing {
 }
 
 impl Indexing {
-    fn new(kind: Kind, described: &Described, assembler: SweepAssembler) -> Self {
+    fn new(kind: Kind, described: &DescribedRadar, assembler: SweepAssembler) -> Self {
         let (limits, clock) = (assembler.limits(), RadarClock::new(&described.radar));
         Self {
             kind,
@@ -199,8 +189,9 @@ impl Indexing {
             place.row += 1;
         });
         if let Err(reason) = added {
-            self.index.first_damage.get_or_insert(reason);
-            self.add_damaged(place, message.log_ns);
+            let first = &mut self.index.first_damage;
+            first.get_or_insert_with(|| reason.clone());
+            self.add_damaged(place, message.log_ns, reason);
         }
     }
 
@@ -244,14 +235,17 @@ impl Indexing {
             });
             self.spans = joined(&self.spans, here);
             let invalid = self.assembler.counters().invalid_azimuths;
-            if let Some(sweep) = self.assembler.add(&azimuth, stamp_ns, self.scan.slot()) {
+            if let Some(sweep) = self
+                .assembler
+                .add(&azimuth, stamp_ns, &mut self.scan.slot())
+            {
                 self.index.entries.push(Entry {
                     start,
                     end: here,
                     spans: self.spans.clone(),
                     stamp_ns: sweep.geometry.stamp_ns,
                     logged_ns,
-                    is_damaged: false,
+                    damage: None,
                 });
                 let start = self.previous.unwrap_or(here);
                 (self.start, self.spans) = (Some(start), joined(&only(start), here));
@@ -280,7 +274,7 @@ impl Indexing {
     }
 
     /// A message that is a whole turn is a scan that cannot be read.
-    fn add_damaged(&mut self, place: Place, logged_ns: i64) {
+    fn add_damaged(&mut self, place: Place, logged_ns: i64, reason: String) {
         self.index.damaged_messages += 1;
         if matches!(self.kind, Kind::BScans | Kind::Images) {
             self.index.entries.push(Entry {
@@ -289,7 +283,7 @@ impl Indexing {
                 spans: only(place),
                 stamp_ns: logged_ns,
                 logged_ns,
-                is_damaged: true,
+                damage: Some(reason),
             });
         }
     }
