@@ -3,8 +3,8 @@
 use bolero::{TypeGenerator, check};
 use gyre_colossus::{
     Azimuth, BadConfiguration, ByteOrder, ClockFormat, Configuration, Damage, Datagrams, Event,
-    Message, Parser, RadarClock, SweepAssembler, asterix, write_azimuth, write_configuration,
-    write_keep_alive, write_other,
+    Message, Parser, Powers, RadarClock, SweepAssembler, asterix, write_azimuth,
+    write_configuration, write_keep_alive, write_other,
 };
 use gyre_datasets::DatasetOptions;
 use gyre_fuzz::{
@@ -34,6 +34,8 @@ pub enum Edit {
     TimeFrom(u8, Number),
     /// The bytes of an azimuth's time.
     Time(u8, [u8; 8]),
+    /// An azimuth of 16-bit powers.
+    Wide(u8),
     /// An azimuth that does not arrive.
     Lost(u8),
 }
@@ -42,6 +44,7 @@ struct Row {
     encoder: u16,
     stamp_ns: i64,
     time: Option<[u8; 8]>,
+    wide: bool,
     lost: bool,
 }
 
@@ -67,6 +70,7 @@ fn edit_radar(configuration: &mut Configuration, rows: &mut [Row], edits: &[Edit
                 row.stamp_ns = row.stamp_ns.wrapping_add(number.bits() as i64);
             }),
             Edit::Time(index, time) => rows[place(index)].time = Some(time),
+            Edit::Wide(index) => rows[place(index)].wide = true,
             Edit::Lost(index) => rows[place(index)].lost = true,
         }
     }
@@ -95,6 +99,7 @@ pub fn stream(edits: &[Edit]) -> Vec<u8> {
         encoder: k % AZIMUTHS * (COUNTS / AZIMUTHS),
         stamp_ns: START_NS + i64::from(k) * 15_625_000,
         time: None,
+        wide: false,
         lost: false,
     };
     let mut rows: Vec<Row> = (0..4 * AZIMUTHS).map(row).collect();
@@ -112,7 +117,10 @@ pub fn stream(edits: &[Edit]) -> Vec<u8> {
             encoder: row.encoder,
             seconds,
             split_seconds,
-            powers: &powers,
+            powers: match row.wide {
+                true => Powers::Sixteen(&powers),
+                false => Powers::Eight(&powers),
+            },
         };
         write_azimuth(&mut bytes, &azimuth);
         write_keep_alive(&mut bytes);
@@ -230,7 +238,7 @@ pub fn datagrams() -> Vec<Vec<u8>> {
             encoder: k % AZIMUTHS * (COUNTS / AZIMUTHS),
             seconds,
             split_seconds,
-            powers: &powers,
+            powers: Powers::Eight(&powers),
         };
         let mut send = |datagram: &[u8]| sent.push(datagram.to_vec());
         asterix::write_azimuth(&radar, &azimuth, &mut number, &mut send);

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_colossus::{Azimuth, Configuration, asterix, write_keep_alive};
+use gyre_colossus::{Azimuth, Configuration, Powers, asterix, write_keep_alive};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -180,7 +180,7 @@ fn datagrams_of_others_are_passed_over_and_counted() {
             encoder: 14,
             seconds: [0; 4],
             split_seconds: [0; 4],
-            powers: &[9; 4],
+            powers: Powers::Eight(&[9; 4]),
         };
         asterix::write_azimuth(&large, &azimuth, &mut number, &mut |datagram| {
             forger.send_to(datagram, &to).unwrap();

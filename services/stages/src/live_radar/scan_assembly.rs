@@ -131,7 +131,7 @@ impl ScanAssembly {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_colossus::ClockFormat;
+    use gyre_colossus::{ClockFormat, Powers};
 
     use super::*;
 
@@ -173,7 +173,7 @@ mod tests {
                 encoder: row * 14,
                 seconds,
                 split_seconds,
-                powers: &[7; 16],
+                powers: Powers::Eight(&[7; 16]),
             };
             let (header, bytes) = (&mut self.header, &mut self.bytes);
             let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);

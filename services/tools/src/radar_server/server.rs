@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, write_azimuth};
+use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
 use gyre_datasets::Dataset;
 use gyre_radar::{OwnedScan, PolarScan, SweepGeometry, scan::flag};
 use gyre_terminal::{Failure, print};
@@ -245,7 +245,7 @@ impl Player<'_> {
             encoder,
             seconds,
             split_seconds,
-            powers: scan.row(row),
+            powers: Powers::Eight(scan.row(row)),
         };
         if row == GARBLED && is_nth(self.played.scans, faults.garbage_every) {
             self.output.send(GARBAGE);

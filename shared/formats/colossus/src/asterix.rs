@@ -41,8 +41,6 @@ const NANO: f64 = 1e9;
 const SPECIAL_BYTES: usize = 25;
 /// The item of cells, in the order of the specification, and the bytes of one block of it.
 const BLOCK_BYTES: [usize; 3] = [4, 64, 256];
-/// The resolution of a cell of 8 bits.
-const EIGHT_BITS: u8 = 4;
 /// Version and ids of Navtech's own messages by UDP, which carry no powers.
 const COLOSSUS_UDP_VERSION: u8 = 2;
 const COLOSSUS_UDP_IDS: std::ops::RangeInclusive<u8> = 10..=50;
@@ -55,6 +53,8 @@ struct Video<'a> {
     angle: u16,
     resolution_m: f32,
     first: usize,
+    /// Bytes per bin, 1 or 2.
+    bin_bytes: usize,
     powers: &'a [u8],
     special: Special,
 }
@@ -167,7 +167,7 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
         items.blocks(1, "I240/030")?;
     }
     let (angle, first, resolution_m) = header(&mut items, has)?;
-    let powers = cells(&mut items, has)?;
+    let (bin_bytes, powers) = cells(&mut items, has)?;
     if has & 1 << 2 != 0 {
         let _time_of_day: [u8; 3] = items.take("I240/140")?;
     }
@@ -179,15 +179,16 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
     }
     let special = special(&mut items)?;
     let bins = usize::from(special.bins);
-    let cells = powers.len();
+    let cells = powers.len() / bin_bytes;
     if first.saturating_add(cells) > bins {
-        return Err(bad_cells([cells, first, cells, bins]));
+        return Err(bad_cells([cells, first, powers.len(), bins]));
     }
     Ok(Some(Video {
         number,
         angle,
         resolution_m,
         first,
+        bin_bytes,
         powers,
         special,
     }))
@@ -238,17 +239,21 @@ fn header(items: &mut Items<'_>, has: u16) -> Result<(u16, usize, f32), Malforme
 }
 
 /// Takes the powers, without the padding of their blocks.
-fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<&'a [u8], Malformed> {
+fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malformed> {
     if has & 1 << 7 == 0 {
         return Err(missing("I240/048"));
     }
     let [compression, resolution] = items.take("I240/048")?;
     let compressed = compression & 0x80 != 0;
-    if compressed || resolution != EIGHT_BITS {
-        return Err(Malformed::new(format!(
-            "a message has powers of resolution {resolution}, compressed: {compressed}, expected {EIGHT_BITS} (8 bits), not compressed"
-        )));
-    }
+    let bin_bytes = match (compressed, resolution) {
+        (false, 4) => 1,
+        (false, 5) => 2,
+        _ => {
+            return Err(Malformed::new(format!(
+                "a message has powers of resolution {resolution} (4: 8 bits, 5: 16 bits), compressed: {compressed}"
+            )));
+        }
+    };
     if has & 1 << 6 == 0 {
         return Err(missing("I240/049"));
     }
@@ -261,8 +266,9 @@ fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<&'a [u8], Malformed> {
             blocks = items.blocks(block, "I240/050")?;
         }
     }
-    let powers = blocks.get(..bytes).filter(|_| bytes == cells);
-    powers.ok_or_else(|| bad_cells([cells, 0, bytes, MAX_PAYLOAD_BYTES]))
+    let powers = blocks.get(..bytes).filter(|_| bytes == cells * bin_bytes);
+    let powers = powers.ok_or_else(|| bad_cells([cells, 0, bytes, MAX_PAYLOAD_BYTES]))?;
+    Ok((bin_bytes, powers))
 }
 
 fn special(items: &mut Items<'_>) -> Result<Special, Malformed> {

@@ -1,6 +1,6 @@
 //! An azimuth that outlives the buffer it was received in.
 
-use crate::message::Azimuth;
+use crate::message::{Azimuth, Powers};
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KeptAzimuth {
@@ -8,6 +8,7 @@ pub(crate) struct KeptAzimuth {
     encoder: u16,
     seconds: [u8; 4],
     split_seconds: [u8; 4],
+    sixteen: bool,
     powers: Vec<u8>,
 }
 
@@ -17,8 +18,9 @@ impl KeptAzimuth {
         self.encoder = azimuth.encoder;
         self.seconds = azimuth.seconds;
         self.split_seconds = azimuth.split_seconds;
+        self.sixteen = matches!(azimuth.powers, Powers::Sixteen(_));
         self.powers.clear();
-        self.powers.extend_from_slice(azimuth.powers);
+        self.powers.extend_from_slice(azimuth.powers.bytes());
     }
 
     pub(crate) fn azimuth(&self) -> Azimuth<'_> {
@@ -27,7 +29,10 @@ impl KeptAzimuth {
             encoder: self.encoder,
             seconds: self.seconds,
             split_seconds: self.split_seconds,
-            powers: &self.powers,
+            powers: match self.sixteen {
+                true => Powers::Sixteen(&self.powers),
+                false => Powers::Eight(&self.powers),
+            },
         }
     }
 }

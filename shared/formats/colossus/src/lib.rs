@@ -24,7 +24,7 @@ pub use clock::{ByteOrder, ClockFormat, FoundClock, RadarClock, SplitUnit};
 pub use configuration::{BadConfiguration, Configuration};
 pub use health::{Health, HealthStatus, Reading};
 pub use malformed::Malformed;
-pub use message::{Azimuth, Message, PORT, Request, decode};
+pub use message::{Azimuth, Message, PORT, Powers, Request, decode};
 pub use parser::{Damage, Event, Parser};
 pub use sweep::{Counters, Sweep, SweepAssembler};
 pub use write::{write_azimuth, write_configuration, write_keep_alive, write_other, write_request};

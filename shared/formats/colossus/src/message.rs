@@ -81,8 +81,32 @@ pub struct Azimuth<'a> {
     pub seconds: [u8; 4],
     /// Nanoseconds or microseconds of the second, in the same byte order.
     pub split_seconds: [u8; 4],
-    /// The powers, nearest bin first, one byte per bin.
-    pub powers: &'a [u8],
+    /// The powers, nearest bin first.
+    pub powers: Powers<'a>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Powers<'a> {
+    /// One byte per bin.
+    Eight(&'a [u8]),
+    /// Two bytes per bin. Their order is not documented; [`SweepAssembler`](crate::SweepAssembler)
+    /// finds it.
+    Sixteen(&'a [u8]),
+}
+
+impl<'a> Powers<'a> {
+    pub fn bins(self) -> usize {
+        match self {
+            Self::Eight(bytes) => bytes.len(),
+            Self::Sixteen(bytes) => bytes.len() / 2,
+        }
+    }
+
+    pub fn bytes(self) -> &'a [u8] {
+        match self {
+            Self::Eight(bytes) | Self::Sixteen(bytes) => bytes,
+        }
+    }
 }
 
 pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, Malformed> {
@@ -92,23 +116,32 @@ pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, Malformed> {
     Ok(match id {
         id::KEEP_ALIVE => Message::KeepAlive,
         id::CONFIGURATION => Message::Configuration(configuration::decode(payload)?),
-        id::AZIMUTH => Message::Azimuth(azimuth(payload)?),
+        id::AZIMUTH => Message::Azimuth(azimuth(payload, Powers::Eight)?),
         id::AZIMUTH_16_BIT => {
-            let reason = "an azimuth has powers of 16 bits: set the radar to powers of 8 bits";
-            return Err(Malformed::new(reason));
+            let azimuth = azimuth(payload, Powers::Sixteen)?;
+            let bytes = azimuth.powers.bytes().len();
+            if bytes % 2 != 0 {
+                return Err(Malformed::new(format!(
+                    "an azimuth of 16-bit powers has {bytes} bytes of powers, an odd number"
+                )));
+            }
+            Message::Azimuth(azimuth)
         }
         id::HEALTH => Message::Health(health::decode(payload)?),
         id => Message::Other { id, payload },
     })
 }
 
-fn azimuth(payload: &[u8]) -> Result<Azimuth<'_>, Malformed> {
+fn azimuth<'a>(
+    payload: &'a [u8],
+    powers: impl Fn(&'a [u8]) -> Powers<'a>,
+) -> Result<Azimuth<'a>, Malformed> {
     let head: [u8; AZIMUTH_BYTES] = head("an azimuth", payload)?;
     let [o0, o1, c0, c1, e0, e1, s0, s1, s2, s3, p0, p1, p2, p3] = head;
     let offset = u16::from_be_bytes([o0, o1]);
-    let powers = payload.get(offset.into()..);
-    let powers = powers.filter(|_| usize::from(offset) >= AZIMUTH_BYTES);
-    let powers = powers.ok_or_else(|| {
+    let bytes = payload.get(offset.into()..);
+    let bytes = bytes.filter(|_| usize::from(offset) >= AZIMUTH_BYTES);
+    let bytes = bytes.ok_or_else(|| {
         let all = payload.len();
         Malformed::new(format!(
             "the powers of an azimuth begin at byte {offset} of a payload of {all} bytes, expected {AZIMUTH_BYTES} or more"
@@ -119,6 +152,6 @@ fn azimuth(payload: &[u8]) -> Result<Azimuth<'_>, Malformed> {
         encoder: u16::from_be_bytes([e0, e1]),
         seconds: [s0, s1, s2, s3],
         split_seconds: [p0, p1, p2, p3],
-        powers,
+        powers: powers(bytes),
     })
 }

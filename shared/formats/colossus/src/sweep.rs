@@ -2,6 +2,7 @@
 //! bit.
 
 mod counters;
+mod powers;
 mod rows;
 mod seam;
 

@@ -1,7 +1,9 @@
 //! Messages as bytes, appended to a buffer.
 
 use crate::configuration::{CONFIGURATION_BYTES, Configuration, RESOLUTION_FIELD};
-use crate::message::{AZIMUTH_BYTES, Azimuth, MAX_PAYLOAD_BYTES, Request, SIGNATURE, VERSION, id};
+use crate::message::{
+    AZIMUTH_BYTES, Azimuth, MAX_PAYLOAD_BYTES, Powers, Request, SIGNATURE, VERSION, id,
+};
 use crate::protobuf::FOUR_BYTES;
 
 pub fn write_configuration(out: &mut Vec<u8>, configuration: &Configuration) {
@@ -30,9 +32,13 @@ pub fn write_configuration(out: &mut Vec<u8>, configuration: &Configuration) {
 /// Appends an azimuth. [`ClockFormat::fields`](crate::ClockFormat::fields) gives its time. Powers
 /// that do not fit into a message of [`MAX_PAYLOAD_BYTES`] are cut.
 pub fn write_azimuth(out: &mut Vec<u8>, azimuth: &Azimuth<'_>) {
-    let powers = azimuth.powers;
+    let id = match azimuth.powers {
+        Powers::Eight(_) => id::AZIMUTH,
+        Powers::Sixteen(_) => id::AZIMUTH_16_BIT,
+    };
+    let powers = azimuth.powers.bytes();
     let powers = &powers[..powers.len().min(MAX_PAYLOAD_BYTES - AZIMUTH_BYTES)];
-    write_header(out, id::AZIMUTH, AZIMUTH_BYTES + powers.len());
+    write_header(out, id, AZIMUTH_BYTES + powers.len());
     out.extend((AZIMUTH_BYTES as u16).to_be_bytes());
     out.extend(azimuth.sweep_counter.to_be_bytes());
     out.extend(azimuth.encoder.to_be_bytes());

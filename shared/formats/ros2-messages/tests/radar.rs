@@ -92,7 +92,8 @@ fn a_turned_image_is_turned_back() {
     turned.b_scan_img.data.rotate_right(5 * 8);
     let powers = |message: &RadarBScanMsg, offset| -> Vec<Vec<u8>> {
         let rows = message.rows(&radar(), offset, START_NS).unwrap();
-        rows.map(|row| row.azimuth.powers.to_vec()).collect()
+        rows.map(|row| row.azimuth.powers.bytes().to_vec())
+            .collect()
     };
     assert_eq!(powers(&turned, 5), powers(&plain, 0));
     assert_ne!(powers(&turned, 0), powers(&plain, 0));

@@ -24,7 +24,7 @@ impl ConfigurationEstimate {
     /// Adds a message that arrived at this time, ns. A damaged one is ignored.
     pub fn add_message(&mut self, message: &PacketMessage, arrival_ns: i64) {
         match message.azimuth() {
-            Ok(Some(azimuth)) => self.add(azimuth.encoder, azimuth.powers.len(), arrival_ns),
+            Ok(Some(azimuth)) => self.add(azimuth.encoder, azimuth.powers.bins(), arrival_ns),
             Ok(None) => {}
             Err(_) => return,
         }

@@ -1,7 +1,7 @@
 //! An azimuth from the messages that carry its parts.
 
 use super::{Special, Video};
-use crate::message::Azimuth;
+use crate::message::{Azimuth, Powers};
 
 const MAX_PARTS: usize = 1024;
 
@@ -9,6 +9,7 @@ const MAX_PARTS: usize = 1024;
 pub(super) struct Assembly {
     /// Angle and description, the same in all parts; `None` before the first.
     of: Option<(u16, Special)>,
+    bin_bytes: usize,
     powers: Vec<u8>,
     parts: Vec<(usize, usize)>,
     bytes: usize,
@@ -19,13 +20,15 @@ pub(super) struct Assembly {
 
 impl Assembly {
     pub(super) fn is_of(&self, video: &Video<'_>) -> bool {
-        self.of == Some((video.angle, video.special))
+        self.of == Some((video.angle, video.special)) && self.bin_bytes == video.bin_bytes
     }
 
     pub(super) fn begin(&mut self, video: &Video<'_>) {
         self.of = Some((video.angle, video.special));
+        self.bin_bytes = video.bin_bytes;
         self.powers.clear();
-        self.powers.resize(video.special.bins.into(), 0);
+        self.powers
+            .resize(usize::from(video.special.bins) * video.bin_bytes, 0);
         self.parts.clear();
         self.bytes = 0;
         self.numbers = (video.number, video.number);
@@ -34,7 +37,8 @@ impl Assembly {
 
     /// Adds a part of this azimuth, unless it is there already; true if all are there with it.
     pub(super) fn add(&mut self, video: &Video<'_>) -> bool {
-        let (from, to) = (video.first, video.first + video.powers.len());
+        let from = video.first * self.bin_bytes;
+        let to = from + video.powers.len();
         let is_there = self.parts.iter().any(|part| from < part.1 && part.0 < to);
         if self.is_done || is_there || self.parts.len() == MAX_PARTS {
             return false;
@@ -79,7 +83,10 @@ impl Assembly {
             encoder: super::encoder(angle, encoder_size),
             seconds: special.seconds,
             split_seconds: special.nanoseconds,
-            powers: &self.powers,
+            powers: match self.bin_bytes {
+                2 => Powers::Sixteen(&self.powers),
+                _ => Powers::Eight(&self.powers),
+            },
         })
     }
 }

@@ -1,8 +1,8 @@
 //! Azimuths as datagrams, as a radar sends them.
 
-use super::{ANGLES, BLOCK_BYTES, CATEGORY, EIGHT_BITS, FEMTO, HALF_C_MPS, SPECIAL_BYTES, VIDEO};
+use super::{ANGLES, BLOCK_BYTES, CATEGORY, FEMTO, HALF_C_MPS, SPECIAL_BYTES, VIDEO};
 use crate::configuration::Configuration;
-use crate::message::Azimuth;
+use crate::message::{Azimuth, Powers};
 
 /// The bytes of a datagram that a radar sends unless it is configured otherwise, at most.
 pub const MAX_DATAGRAM_BYTES: usize = 1400;
@@ -26,12 +26,23 @@ pub fn write_azimuth(
     number: &mut u32,
     send: &mut dyn FnMut(&[u8]),
 ) {
+    let (bin_bytes, powers) = match azimuth.powers {
+        Powers::Eight(powers) => (1, powers),
+        Powers::Sixteen(powers) => (2, powers),
+    };
     // Whole blocks, so that only the last datagram has padding.
     let part = (MAX_DATAGRAM_BYTES - OVERHEAD_BYTES) / BLOCK_BYTES[1] * BLOCK_BYTES[1];
     let mut datagram = Vec::with_capacity(MAX_DATAGRAM_BYTES);
-    for (k, powers) in azimuth.powers.chunks(part).enumerate() {
+    for (k, powers) in powers.chunks(part).enumerate() {
         datagram.clear();
-        write(&mut datagram, radar, azimuth, *number, (k * part, powers));
+        let first = k * part / bin_bytes;
+        write(
+            &mut datagram,
+            radar,
+            azimuth,
+            *number,
+            (first, bin_bytes, powers),
+        );
         *number = number.wrapping_add(1);
         send(&datagram);
     }
@@ -44,18 +55,18 @@ pub fn write_description(out: &mut Vec<u8>, radar: &Configuration, number: u32) 
         encoder: 0,
         seconds: [0; 4],
         split_seconds: [0; 4],
-        powers: &[],
+        powers: Powers::Eight(&[]),
     };
-    write(out, radar, &azimuth, number, (0, &[]));
+    write(out, radar, &azimuth, number, (0, 1, &[]));
 }
 
-/// Appends a message of some bins of an azimuth: the first, and their powers.
+/// Appends a message of some bins of an azimuth: the first, the bytes of each, and their powers.
 fn write(
     out: &mut Vec<u8>,
     radar: &Configuration,
     azimuth: &Azimuth<'_>,
     number: u32,
-    (first, powers): (usize, &[u8]),
+    (first, bin_bytes, powers): (usize, usize, &[u8]),
 ) {
     let begin = out.len();
     let size = u32::from(radar.encoder_size.max(1));
@@ -73,9 +84,9 @@ fn write(
     out.extend(angle(encoder + step).to_be_bytes());
     out.extend((first as u32).to_be_bytes());
     out.extend(((resolution_m / HALF_C_MPS * FEMTO).round() as u32).to_be_bytes());
-    out.extend([0, EIGHT_BITS]);
+    out.extend([0, 3 + bin_bytes as u8]);
     out.extend((powers.len() as u16).to_be_bytes());
-    out.extend(&(powers.len() as u32).to_be_bytes()[1..]);
+    out.extend(&((powers.len() / bin_bytes) as u32).to_be_bytes()[1..]);
     out.push(blocks as u8);
     out.extend_from_slice(powers);
     let padding = blocks * BLOCK_BYTES[1] - powers.len();

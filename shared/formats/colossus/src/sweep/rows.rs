@@ -4,7 +4,9 @@ use gyre_radar::scan::flag;
 use gyre_radar::{ScanLimits, ScanSlot};
 
 use super::counters::Counters;
+use super::powers::PowerOrder;
 use crate::configuration::Configuration;
+use crate::message::Powers;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Empty {
@@ -23,6 +25,7 @@ pub(super) struct RowWriter {
     encoder_size: f64,
     pub(super) written: usize,
     pub(super) missing: usize,
+    order: PowerOrder,
 }
 
 impl RowWriter {
@@ -38,6 +41,7 @@ impl RowWriter {
             encoder_size: f64::from(configuration.encoder_size),
             written: 0,
             missing: 0,
+            order: PowerOrder::default(),
         }
     }
 
@@ -59,16 +63,17 @@ impl RowWriter {
     pub(super) fn write_measured(
         &mut self,
         place: (f64, i64),
-        powers: &[u8],
+        powers: Powers<'_>,
         slot: &mut ScanSlot<'_>,
         counters: &mut Counters,
     ) {
         let Some(row) = self.next_row(place, flag::MEASURED, slot) else {
             return;
         };
-        counters.cut_rows += u64::from(powers.len() > row.len());
-        let measured = powers.len().min(row.len());
-        row[..measured].copy_from_slice(&powers[..measured]);
+        let bins = powers.bins();
+        counters.cut_rows += u64::from(bins > row.len());
+        let measured = bins.min(row.len());
+        self.order.write(powers, &mut row[..measured]);
         row[measured..].fill(0);
     }
 

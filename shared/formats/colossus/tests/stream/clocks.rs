@@ -1,7 +1,7 @@
 //! Radars with clocks of all kinds.
 
 use gyre_colossus::{
-    Azimuth, ByteOrder, ClockFormat, Configuration, FoundClock, RadarClock, SplitUnit,
+    Azimuth, ByteOrder, ClockFormat, Configuration, FoundClock, Powers, RadarClock, SplitUnit,
 };
 use proptest::prelude::*;
 
@@ -86,7 +86,7 @@ proptest! {
                 encoder: *encoder,
                 seconds: *seconds,
                 split_seconds: *split_seconds,
-                powers: &[],
+                powers: Powers::Eight(&[]),
             };
             count += clock.stamp(azimuth, *arrived_ns).count();
         }

@@ -1,7 +1,7 @@
 //! Messages as bytes.
 
 use gyre_colossus::{
-    Azimuth, Configuration, HealthStatus, Message, Reading, Request, decode, write_azimuth,
+    Azimuth, Configuration, HealthStatus, Message, Powers, Reading, Request, decode, write_azimuth,
     write_configuration, write_keep_alive, write_other, write_request,
 };
 use proptest::prelude::*;
@@ -13,7 +13,7 @@ use crate::support::configuration;
 pub enum Sent {
     KeepAlive,
     Configuration(Configuration),
-    Azimuth([u16; 2], [[u8; 4]; 2], Vec<u8>),
+    Azimuth([u16; 2], [[u8; 4]; 2], bool, Vec<u8>),
     Request(Request),
     Other(u8, Vec<u8>),
 }
@@ -25,13 +25,16 @@ impl Sent {
             Self::Configuration(configuration) => Message::Configuration(*configuration),
             Self::Request(request) => Message::Request(*request),
             Self::Other(id, payload) => Message::Other { id: *id, payload },
-            Self::Azimuth([sweep_counter, encoder], [seconds, split_seconds], powers) => {
+            Self::Azimuth([sweep_counter, encoder], [seconds, split_seconds], wide, powers) => {
                 Message::Azimuth(Azimuth {
                     sweep_counter: *sweep_counter,
                     encoder: *encoder,
                     seconds: *seconds,
                     split_seconds: *split_seconds,
-                    powers,
+                    powers: match wide {
+                        true => Powers::Sixteen(&powers[..powers.len() / 2 * 2]),
+                        false => Powers::Eight(powers),
+                    },
                 })
             }
         }
@@ -75,8 +78,13 @@ pub fn any_message() -> impl Strategy<Value = Sent> {
         prop::sample::select(Request::ALL.to_vec()).prop_map(Sent::Request),
         (prop::sample::select(vec![0, 50, 128, 255]), powers())
             .prop_map(|(id, payload)| Sent::Other(id, payload)),
-        (any::<[u16; 2]>(), any::<[[u8; 4]; 2]>(), powers())
-            .prop_map(|(numbers, times, powers)| Sent::Azimuth(numbers, times, powers)),
+        (
+            any::<[u16; 2]>(),
+            any::<[[u8; 4]; 2]>(),
+            any::<bool>(),
+            powers()
+        )
+            .prop_map(|(numbers, times, wide, powers)| Sent::Azimuth(numbers, times, wide, powers)),
     ]
 }
 
@@ -97,7 +105,7 @@ fn the_layout_is_that_of_the_protocol() {
         encoder: 0x0304,
         seconds: [5, 6, 7, 8],
         split_seconds: [9, 10, 11, 12],
-        powers: &[13, 14],
+        powers: Powers::Eight(&[13, 14]),
     };
     write_azimuth(&mut bytes, &azimuth);
     let signature = [0, 1, 3, 3, 7, 7, 15, 15, 31, 31, 63, 63, 127, 127, 254, 254];
@@ -113,10 +121,11 @@ fn powers_begin_where_the_message_says() {
     for (offset, id, powers) in [
         (14, 30, &[2_u8, 3, 4, 5, 6][..]),
         (17, 30, &[5, 6]),
+        (17, 31, &[5, 6]),
         (19, 30, &[]),
     ] {
         match decode(id, &payload(offset)) {
-            Ok(Message::Azimuth(azimuth)) => assert_eq!(azimuth.powers, powers),
+            Ok(Message::Azimuth(azimuth)) => assert_eq!(azimuth.powers.bytes(), powers),
             other => panic!("{other:?}"),
         }
     }
@@ -125,7 +134,7 @@ fn powers_begin_where_the_message_says() {
         (13, 30, "begin at byte 13"),
         (20, 30, "begin at byte 20"),
         (255, 30, "begin at byte 255"),
-        (14, 31, "powers of 16 bits"),
+        (14, 31, "has 5 bytes of powers, an odd number"),
     ] {
         let refused = decode(id, &payload(offset)).unwrap_err().to_string();
         assert!(refused.contains(words), "{refused}");

@@ -1,7 +1,8 @@
 //! A radar that turns.
 
 use gyre_colossus::{
-    Azimuth, ClockFormat, Configuration, Counters, Event, Parser, RadarClock, Sweep, SweepAssembler,
+    Azimuth, ClockFormat, Configuration, Counters, Event, Parser, Powers, RadarClock, Sweep,
+    SweepAssembler,
 };
 use gyre_datasets::DatasetOptions;
 use gyre_radar::OwnedScan;
@@ -40,7 +41,7 @@ impl SentAzimuth {
             encoder: self.encoder,
             seconds,
             split_seconds,
-            powers: &self.powers,
+            powers: Powers::Eight(&self.powers),
         }
     }
 }
@@ -150,7 +151,7 @@ pub fn stamped(
             stamped.push(SentAzimuth {
                 encoder: azimuth.encoder,
                 stamp_ns,
-                powers: azimuth.powers.to_vec(),
+                powers: azimuth.powers.bytes().to_vec(),
             });
         }
     }

@@ -1,6 +1,8 @@
 //! Azimuths to scans.
 
-use gyre_colossus::{ClockFormat, Configuration, Counters, SweepAssembler};
+use gyre_colossus::{
+    Azimuth, ByteOrder, ClockFormat, Configuration, Counters, Powers, SweepAssembler,
+};
 use gyre_datasets::{DatasetOptions, correct_eccentricity};
 use gyre_radar::{OwnedScan, Sense, scan::flag};
 use proptest::prelude::*;
@@ -168,6 +170,34 @@ fn rows_of_other_lengths_are_padded_and_cut() {
     assert_eq!(scan.row(3), [0; 6]);
     assert_eq!(scan.row(4), rows[4].powers);
     assert_eq!(assembly.counters().cut_rows, 1);
+}
+
+#[test]
+fn the_order_of_16_bit_powers_is_found() {
+    let radar = configuration(5600, 300);
+    let rows = turns(&radar, 0, START_NS, 1);
+    // A power that changes slowly, with noise in its lower byte.
+    let power = |k: usize, bin: usize| 8000 + (bin * 20 + k) as u16 + (bin * 7919 % 251) as u16;
+    for order in [ByteOrder::Little, ByteOrder::Big] {
+        let mut assembly = Assembly::new(&radar);
+        for (k, row) in rows.iter().enumerate() {
+            let bytes = |bin| match order {
+                ByteOrder::Little => power(k, bin).to_le_bytes(),
+                ByteOrder::Big => power(k, bin).to_be_bytes(),
+            };
+            let bytes: Vec<u8> = (0..300).flat_map(bytes).collect();
+            let azimuth = Azimuth {
+                powers: Powers::Sixteen(&bytes),
+                ..row.azimuth(ClockFormat::default())
+            };
+            assembly.add(&azimuth, row.stamp_ns);
+        }
+        let scan = assembly.sweeps[0].1.view();
+        for k in 0..400 {
+            let expected: Vec<u8> = (0..300).map(|bin| (power(k, bin) >> 8) as u8).collect();
+            assert_eq!(scan.row(k), expected);
+        }
+    }
 }
 
 #[test]

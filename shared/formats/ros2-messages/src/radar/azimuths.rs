@@ -1,6 +1,6 @@
 //! Messages of one azimuth.
 
-use gyre_colossus::Azimuth;
+use gyre_colossus::{Azimuth, Powers};
 
 use crate::{
     BadMessage, Ros2Message, messages::RadarFftDataMessage, navtech_msgs::RadarFftDataMsg,
@@ -15,7 +15,7 @@ impl RadarFftDataMsg {
             encoder: self.azimuth,
             seconds: self.ntp_seconds.to_le_bytes(),
             split_seconds: self.ntp_split_seconds.to_le_bytes(),
-            powers: &self.data,
+            powers: Powers::Eight(&self.data),
         }
     }
 }
@@ -28,7 +28,7 @@ impl RadarFftDataMessage {
             encoder: u16::from_be_bytes(number::<Self, 2>("azimuth", &self.azimuth)?),
             seconds: number::<Self, 4>("ntp_seconds", &self.ntp_seconds)?,
             split_seconds: number::<Self, 4>("ntp_split_seconds", &self.ntp_split_seconds)?,
-            powers: &self.data,
+            powers: Powers::Eight(&self.data),
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Messages of one turn.
 
-use gyre_colossus::{Azimuth, Configuration};
+use gyre_colossus::{Azimuth, Configuration, Powers};
 
 use crate::{navtech_msgs::RadarBScanMsg, sensor_msgs::Image};
 
@@ -108,7 +108,7 @@ fn azimuth(encoder: u16, stamp: u64, powers: &[u8]) -> Azimuth<'_> {
         encoder,
         seconds: seconds.to_le_bytes(),
         split_seconds: ((stamp % SECOND_NS) as u32).to_le_bytes(),
-        powers,
+        powers: Powers::Eight(powers),
     }
 }
 
