@@ -3,6 +3,7 @@
 
 pub mod difference;
 mod validation;
+mod without_effect;
 
 use std::{
     collections::BTreeMap,

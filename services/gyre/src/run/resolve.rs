@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use gyre_configuration::{Configuration, calibration, strict::path_value};
 use gyre_results::absolute;
 use gyre_run::PlayedFrom;
-use gyre_terminal::Failure;
 use gyre_terminal::inputs::Given;
+use gyre_terminal::{Failure, print};
 
 use super::results_folder;
 use crate::cli::RunArguments;
@@ -38,6 +38,9 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     if configuration.objects.is_on() {
         configuration.odometry.masking.resolve_library()?;
     }
+    let idle = configuration.without_effect(&arguments.inputs.set)?;
+    idle.iter()
+        .for_each(|sentence| print::note(format_args!("gyre: {sentence}")));
     // The run's processes receive the path of the run.
     path_value(&absolute(&results_folder(arguments)?)?)?;
     Ok(configuration)

@@ -105,6 +105,32 @@ fn impossible_values_are_refused_with_the_key_and_what_is_possible() {
 }
 
 #[test]
+fn settings_without_effect_are_named() {
+    let named = |overrides: &[&str]| {
+        let overrides: Vec<String> = overrides.iter().map(|it| (*it).to_owned()).collect();
+        let configuration = Configuration::of_overrides(&overrides).unwrap();
+        configuration.without_effect(&overrides).unwrap()
+    };
+    let sentence = "gyro.file is set and has no effect, since gyro.kind is `none`: it needs `log`";
+    assert_eq!(named(&["gyro.file=a.csv"]), [sentence]);
+    for idle in [
+        &["gyro.kind=auto", "gyro.file=a.csv"][..],
+        &["wheels.delay_s=1"],
+        &["gnss.listen=127.0.0.1:1"],
+        &["masking.kind=none", "masking.threshold=60"],
+    ] {
+        assert_eq!(named(idle).len(), 1, "{idle:?}");
+    }
+    for used in [
+        &["gyro.kind=log", "gyro.file=a.csv", "gyro.delay_s=1"][..],
+        &["gyro.kind=none", "run.window=3", "simulation.scans=3"],
+        &["masking.threshold=60", "simulation.gyro.delay_s=1"],
+    ] {
+        assert_eq!(named(used), [""; 0], "{used:?}");
+    }
+}
+
+#[test]
 fn a_simulation_has_the_form_that_the_dataset_is_read_in() {
     let format = |text: &str| from(text).unwrap().simulation.unwrap().output.format;
     assert_eq!(
