@@ -35,7 +35,7 @@ pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> 
         true => (Scan::ENTRY, Masked::ENTRY),
         false => (Masked::ENTRY, Rotation::ENTRY),
     };
-    let (node, manifest) = (launch.node(), &launch.manifest);
+    let (node, manifest) = (&launch.node, &launch.manifest);
     let tap = |topic| match silently {
         true => Tap::silent(topic, node, manifest),
         false => Tap::to(topic, node, manifest),
