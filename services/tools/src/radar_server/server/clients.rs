@@ -58,7 +58,7 @@ impl Clients {
     /// Sends bytes to the clients that have asked for azimuths, and drops those that fail.
     pub fn send(&self, bytes: &[u8]) {
         lock(&self.all).retain_mut(|client| {
-            let takes = !client.started || client.stream.write_all(bytes).is_ok();
+            let takes = !client.started || write_in_time(&mut client.stream, bytes).is_ok();
             if !takes {
                 let _ = client.stream.shutdown(Shutdown::Both);
             }
@@ -83,6 +83,20 @@ impl Clients {
             while began.elapsed() < LINGER && matches!(client.stream.read(&mut rest), Ok(1..)) {}
         }
     }
+}
+
+/// Writes a message within [`WRITE_TIMEOUT`]. The time-out of the socket begins anew with each part
+/// that a client reads, and all other clients wait meanwhile.
+fn write_in_time(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
+    let began = Instant::now();
+    while !bytes.is_empty() {
+        let written = stream.write(bytes)?;
+        if written == 0 || began.elapsed() > WRITE_TIMEOUT {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        bytes = &bytes[written..];
+    }
+    Ok(())
 }
 
 /// Sends the configuration to a client, and reads its requests in a thread.
