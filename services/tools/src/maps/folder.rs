@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
-use gyre_results::{Content, Out};
+use gyre_results::{Content, Out, OutError};
 use gyre_slam::{Keyframe, Record, localisation::Map};
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::Failure;
@@ -26,11 +26,14 @@ pub fn settle(map: &Path) -> Result<(), Failure> {
     if !is_interrupted(map) {
         return Ok(());
     }
-    let locked = Out::lock_for(map, Content::MAP).map_err(Failure::from);
+    let locked = match Out::lock_for(map, Content::MAP) {
+        Err(held @ OutError::Held(_)) => return Err(held.into()),
+        locked => locked.map_err(Failure::from),
+    };
     let finished = locked.and_then(|_locked| Ok(finish(map)?));
     finished.map_err(|error| {
         format!(
-            "the map {} was left half replaced by a command that was killed, and cannot be put right: {error}",
+            "the map {} was left half replaced by a command that was killed, and cannot be put right ({error}): let its owner read it once, with gyre localise, or draw it again",
             map.display()
         )
         .into()
@@ -177,7 +180,7 @@ mod tests {
         write_all(&map.join(NEXT), "later");
         let writing = Out::lock_for(map, Content::MAP).unwrap();
         let refused = settle(map).unwrap_err().to_string();
-        assert!(refused.contains("another command is writing"));
+        assert!(refused.starts_with("another command is writing"));
         drop(writing);
         settle(map).unwrap();
         assert_eq!(content(map, "map.toml"), "later");
