@@ -96,7 +96,7 @@ fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_e
     send(pid, Signal::STOP);
     running
         .await_poses(SCANS)
-        .await_words("loop closing: 0 of 0 keyframes");
+        .await_words("waiting for loop-closure: 0 of 0 records");
     send(pid, Signal::CONT);
     running.finish().succeeded();
     assert_undisturbed(&run, "stopped");
@@ -108,7 +108,9 @@ fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_e
 fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
     let slow = run().set("stages.loop-closure.delay_ms=200");
     let mut running = slow.start();
-    running.await_poses(SCANS).await_words("loop closing: ");
+    running
+        .await_poses(SCANS)
+        .await_words("waiting for loop-closure: ");
     running.signal(Signal::INT);
     let ended = running.finish();
     assert_eq!(ended.code(), Some(130));

@@ -48,7 +48,8 @@ impl Progress {
             Event::Following { follower, progress } => {
                 self.radar = None;
                 let (done, total) = (progress.done, progress.total);
-                self.bar.show(format!("{follower}: {done} of {total}"));
+                self.bar
+                    .show(format!("waiting for {follower}: {done} of {total} records"));
             }
             Event::Watched => self.silence(),
             Event::Stopping => self.radar = None,
