@@ -12,7 +12,7 @@ use std::{
 
 use clap::Args;
 use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
-use gyre_configuration::{Configuration, Played, describe_masks, with_stored_options};
+use gyre_configuration::{Configuration, Played, describe_masks_in_process, with_stored_options};
 use gyre_radar::{OwnedScan, SweepGeometry};
 use gyre_results::{Content, Out};
 use gyre_samples::{GyroKind, WheelsKind};
@@ -220,7 +220,9 @@ fn read(
     arguments: &CalibrateArguments,
 ) -> Result<(Drive, SweepGeometry), Failure> {
     let Played { mut dataset, .. } = gyre_configuration::open(configuration)?;
-    describe_masks(configuration)?.iter().for_each(print::note);
+    describe_masks_in_process(configuration)?
+        .iter()
+        .for_each(print::note);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
     let played = configuration.source.played(dataset.scans());

@@ -8,7 +8,7 @@ pub mod picture;
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::describe_masks;
+use gyre_configuration::describe_masks_in_process;
 use gyre_results::Content;
 use gyre_terminal::{Failure, inputs::Inputs, print};
 
@@ -47,7 +47,9 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         &configuration.data(),
     )?;
     let mut inspector = MaskInspector::new(&configuration, played)?;
-    describe_masks(&configuration)?.iter().for_each(print::note);
+    describe_masks_in_process(&configuration)?
+        .iter()
+        .for_each(print::note);
     let out = &arguments.out;
     Content::MASKS.require_place(out)?;
     gyre_storage::create_folder(out)?;

@@ -20,7 +20,7 @@ pub use automatic::{Automatic, AutomaticError, automatic, radar_constants};
 #[cfg(feature = "run")]
 pub use configuration::{Configuration, difference, process_names};
 #[cfg(feature = "run")]
-pub use masks::{describe_masks, describe_objects};
+pub use masks::{describe_masks, describe_masks_in_process, describe_objects};
 pub use method::MethodConfig;
 #[cfg(feature = "run")]
 pub use scans::{Played, fingerprint, gnss_log, open, simulated_samples, with_stored_options};

@@ -9,6 +9,22 @@ use gyre_odometry::OdometryConfig;
 
 use crate::configuration::Configuration;
 
+/// Returns what [`describe_masks`] does, for a command that masks scans in its own process: it does
+/// not call a function of Python.
+pub fn describe_masks_in_process(
+    configuration: &Configuration,
+) -> Result<Vec<String>, Box<dyn Error + Send + Sync>> {
+    let mut sentences = describe_masks(configuration)?;
+    let stage = configuration.stages.get(StageId::Masking.name());
+    if let Some(file) = stage.and_then(|stage| stage.python.as_ref()) {
+        sentences.push(format!(
+            "the mask of {} is called in runs alone: the threshold masks here",
+            file.display()
+        ));
+    }
+    Ok(sentences)
+}
+
 /// Returns sentences: which library computes learned masks, and where a configuration differs from
 /// the one that its network was trained for. None without learned masks.
 pub fn describe_masks(

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use gyre_configuration::{Configuration, describe_masks};
+use gyre_configuration::{Configuration, describe_masks_in_process};
 use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::Twist;
 use gyre_odometry::{Odometry, Outcome};
@@ -34,7 +34,9 @@ impl Scans {
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let played = gyre_configuration::open(configuration)?;
         let dataset = played.dataset;
-        describe_masks(configuration)?.iter().for_each(print::note);
+        describe_masks_in_process(configuration)?
+            .iter()
+            .for_each(print::note);
         Ok(Self {
             played: configuration.source.played(dataset.scans()),
             odometry: Odometry::new(&configuration.odometry)?,
