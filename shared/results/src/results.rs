@@ -27,7 +27,7 @@ use crate::{
     summary::{Measured, Session, SlamSummary, Summary},
 };
 use files::Files;
-use pass::{Pass, Read};
+use pass::{MOST_JUDGED, Pass, Read};
 use slam::Slam;
 
 pub use map::map_options;
@@ -158,6 +158,12 @@ fn add_corrected(
 
 /// Evaluates the trajectory and its covariances against the ground truth, if that fits.
 fn judged(path: &Path, estimate: &Read) -> Option<Judgement> {
+    if estimate.are_too_many {
+        let truth = path.display();
+        print::note(format_args!(
+            "not evaluated against {truth}: more than {MOST_JUDGED} poses are too many to keep in memory beside a run: use gyre evaluate"
+        ));
+    }
     if estimate.trajectory.poses.len() < 2 {
         return None;
     }

@@ -12,6 +12,10 @@ use gyre_terminal::Failure;
 use super::{Files, Slam, sketch::Sketch};
 use crate::{odometry, poses, summary::Counter};
 
+/// The most poses that are judged beside a run: they take half a gigabyte, and are 28 hours at
+/// 10 Hz.
+pub const MOST_JUDGED: usize = 1_000_000;
+
 /// Writes the tables row by row, and measures and counts all else.
 pub struct Pass<'a, 'b> {
     files: &'a mut Files<'b>,
@@ -39,6 +43,8 @@ pub struct Read {
     pub trajectory: Trajectory,
     pub motions: Vec<TimedMotion>,
     pub corrected: Trajectory,
+    /// True if there were more poses to judge than [`MOST_JUDGED`]: none is kept.
+    pub are_too_many: bool,
     pub corrected_sketch: Sketch,
 }
 
@@ -94,6 +100,7 @@ impl<'a, 'b> Pass<'a, 'b> {
         if self.is_judged {
             push(&mut self.read.trajectory, pose.item.stamp_ns, place);
             self.read.motions.extend(odometry::motion(pose));
+            self.let_go_of_too_many();
         }
         Ok(())
     }
@@ -111,6 +118,14 @@ impl<'a, 'b> Pass<'a, 'b> {
             push(&mut self.read.corrected, stamp_ns, corrected);
         }
         Ok(tum.append(line)?)
+    }
+
+    fn let_go_of_too_many(&mut self) {
+        let read = &mut self.read;
+        if read.trajectory.poses.len() > MOST_JUDGED {
+            (read.trajectory, read.motions, read.corrected) = Default::default();
+            (read.are_too_many, self.is_judged) = (true, false);
+        }
     }
 
     pub fn finish(self) -> Read {
