@@ -95,7 +95,7 @@ fn files_without_end_are_refused_whatever_reads_them() {
             ["simulation.toml", "a device"],
         ),
         (format!("{evaluate}\n{}", path(&truth)), ["truth.tum", ""]),
-        (format!("{evaluate}\n{motions}"), ["odometry.csv", "MB"]),
+        (format!("{evaluate}\n{motions}"), ["odometry.csv", "line"]),
         (learned(Path::new("/dev/zero")), ["/dev/zero", "a device"]),
         (learned(&card), ["single-127.onnx", "MB"]),
     ] {

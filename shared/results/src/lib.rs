@@ -13,6 +13,7 @@ mod out;
 mod poses;
 mod results;
 mod summary;
+mod table;
 
 pub use georeference::georeference;
 pub use identity::{Identity, Programs};

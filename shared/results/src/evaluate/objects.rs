@@ -12,10 +12,10 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use crate::table;
+
 /// An object is visible if its strongest echo reaches this many counts, the threshold of the masks.
 const SEEN_COUNTS: f64 = 60.0;
-/// The largest table, bytes.
-const MAX_BYTES: u64 = 4 << 30;
 
 #[derive(Deserialize)]
 struct TrackedRow {
@@ -98,12 +98,7 @@ pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
 
 /// Reads a table as CSV by the names of its columns.
 pub fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
-    let text = gyre_storage::read_text(path, MAX_BYTES)
-        .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let rows: Result<Vec<T>, csv::Error> = reader.deserialize().collect();
+    let rows: Result<Vec<T>, csv::Error> = table::open(path)?.deserialize().collect();
     rows.map_err(|error| format!("{}: {error}", path.display()).into())
 }
 

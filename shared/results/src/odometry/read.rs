@@ -1,11 +1,13 @@
 //! Reads `odometry.csv` back, by the names in its header: other columns may be added or removed.
 
-use std::path::Path;
+use std::{io::Read, path::Path};
 
 use gyre_evaluation::TimedMotion;
 use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
 use gyre_terminal::Failure;
 use serde::Deserialize;
+
+use crate::table;
 
 const COLUMNS: &str =
     "stamp_ns interval_ns x_m y_m yaw_rad cov_xx cov_xy cov_xyaw cov_yy cov_yyaw cov_yawyaw";
@@ -28,21 +30,13 @@ struct MotionRow {
     scale_sigma: Option<f64>,
 }
 
-/// The largest file, bytes: a month at 10 Hz has 9 GB.
-const MAX_BYTES: u64 = 16 << 30;
-
 /// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion
 /// has none.
 pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
-    let text = gyre_storage::read_text(path, MAX_BYTES)
-        .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    parse(&text).map_err(|reason| format!("{}: {reason}", path.display()).into())
+    parse(table::open(path)?).map_err(|reason| format!("{}: {reason}", path.display()).into())
 }
 
-fn parse(text: &str) -> Result<Vec<TimedMotion>, Failure> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
+fn parse(mut reader: csv::Reader<impl Read>) -> Result<Vec<TimedMotion>, Failure> {
     let header = reader.headers()?;
     let missing = |name: &&str| header.iter().all(|column| column != *name);
     if let Some(name) = COLUMNS.split(' ').find(missing) {
@@ -96,6 +90,10 @@ mod tests {
         text
     }
 
+    fn parsed(text: &str) -> Result<Vec<TimedMotion>, Failure> {
+        parse(table::reader(text.as_bytes()))
+    }
+
     fn motions(poses: &[PoseHeader]) -> Vec<TimedMotion> {
         poses.iter().filter_map(motion).collect()
     }
@@ -132,15 +130,15 @@ mod tests {
         let (poses, text) = (poses(), csv(&poses()));
         assert!(text.contains(",refined,yaw-offset,"));
         assert!(text.ends_with(",1,0.250000000,0.010000000\n"));
-        assert_eq!(parse(&text).unwrap(), motions(&poses));
+        assert_eq!(parsed(&text).unwrap(), motions(&poses));
         let wider = text.lines().map(|line| format!("new,{line},newer\n"));
         let wider: String = wider.collect();
-        assert_eq!(parse(&wider).unwrap(), motions(&poses));
+        assert_eq!(parsed(&wider).unwrap(), motions(&poses));
     }
 
     #[test]
     fn an_empty_covariance_is_none_and_the_motion_stays() {
-        let read = parse(&csv(&poses()).replace("0.040000000000", "")).unwrap();
+        let read = parsed(&csv(&poses()).replace("0.040000000000", "")).unwrap();
         assert_eq!(read.len(), 3);
         assert!(read[0].estimate.motion == motions(&poses())[0].estimate.motion);
         assert!(!read[0].estimate.alone().has_covariance());
@@ -149,7 +147,7 @@ mod tests {
     #[test]
     fn an_interval_before_the_beginning_of_time_is_refused() {
         let text = csv(&poses()).replace(",250000000,", ",-9223372036854775808,");
-        let refused = parse(&text).unwrap_err().to_string();
+        let refused = parsed(&text).unwrap_err().to_string();
         assert!(refused.contains("interval_ns"), "{refused}");
     }
 }
