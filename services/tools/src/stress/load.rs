@@ -89,7 +89,9 @@ pub(super) fn observe(out: &Path) -> Result<(), Failure> {
     print::line(READY)?;
     while !observers.iter().all(|it| it.has_ended()) {
         let listeners: Vec<_> = observers.iter().map(|it| it.listener()).collect();
-        wait_for_any(&signals, &listeners, MAX_WAIT)?;
+        if wait_for_any(&signals, &listeners, MAX_WAIT)? {
+            break;
+        }
         for observer in &mut observers {
             while let Some(message) = observer.take()? {
                 black_box(message);
