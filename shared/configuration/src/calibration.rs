@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use gyre_datasets::DatasetOptions;
+use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_storage as storage;
 
 use crate::{ConfigurationError, strict};
@@ -29,6 +31,14 @@ pub fn overrides(file: &Path) -> Result<Vec<String>, ConfigurationError> {
             "a calibration has the sections [dataset], [gyro] and [wheels], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`",
         ));
     }
+    let mut sections = table.clone();
+    let dataset = strict::section::<DatasetOptions>(&mut sections, "dataset").map(drop);
+    let gyro = strict::section::<GyroConfig>(&mut sections, "gyro").map(drop);
+    let wheels = strict::section::<WheelsConfig>(&mut sections, "wheels").map(drop);
+    dataset
+        .and(gyro)
+        .and(wheels)
+        .map_err(|error| unusable(&error.to_string()))?;
     let sections = table
         .iter()
         .filter_map(|(name, section)| Some((name, section.as_table()?)));
@@ -77,6 +87,7 @@ mod tests {
         for (text, words) in [
             ("[dataset]\n[points]\nbeam_deg = 3\n", "and no more"),
             ("[points]\nmin_range_m = 7\n", "and no more"),
+            ("[gyro]\nlate = 1.58\n", "late"),
         ] {
             let refused = of(text).unwrap_err().to_string();
             assert!(refused.contains(words), "{refused}");
