@@ -30,8 +30,8 @@ const RECORDING: &str = "record.file";
 #[derive(Clone, Debug)]
 pub struct Named {
     pub table: Table,
-    /// Keys, and sentences about paths in the current folder, for as long as no others take their
-    /// places.
+    /// Keys, and sentences about files in the current folder that are used, or are not, for as long
+    /// as no others take their places.
     notes: Vec<(String, String)>,
 }
 
@@ -74,6 +74,14 @@ impl Named {
                     );
                     notes.push((key.to_owned(), sentence));
                     put(path, here)
+                }
+                (Some(own), Some(here)) if differs(&own, &here) => {
+                    let here = here.display();
+                    let sentence = format!(
+                        "{key}: {path} is that of the program, and {here} differs: to use that, name it by its whole path"
+                    );
+                    notes.push((key.to_owned(), sentence));
+                    put(path, own)
                 }
                 (found, _) => found.or(beside).map_or(Ok(()), |found| put(path, found)),
             }
@@ -176,6 +184,14 @@ fn is_name(named: &Path) -> bool {
     named.extension().is_none() && named.file_name() == Some(named.as_os_str())
 }
 
+/// Returns whether a file of the program is another than this one.
+fn differs(own: &Path, file: &Path) -> bool {
+    gyre_shipped::bytes(own).is_some_and(|own| {
+        let read = gyre_storage::read_bytes(file, own.len() as u64);
+        read.ok().as_deref() != Some(own)
+    })
+}
+
 fn value<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let (first, rest) = key.split_once('.')?;
     let mut parts = rest.split('.');
@@ -226,11 +242,15 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_the_program_goes_before_one_in_the_current_folder() {
+    fn a_file_of_the_program_goes_before_one_in_the_current_folder_which_is_named() {
         let own = Path::new("gyre:models/gyre-255.toml");
-        let (_folder, named) = read(&["here/models/gyre-255.toml"], MODEL);
+        let (_folder, named) = read(&[], MODEL);
         assert_eq!(at(&named, "masking.model"), own);
         assert!(named.notes(&named.table).is_empty());
+        let (_folder, named) = read(&["here/models/gyre-255.toml"], MODEL);
+        assert_eq!(at(&named, "masking.model"), own);
+        let note = &named.notes(&named.table)[0];
+        assert!(note.contains("is that of the program, and"), "{note}");
     }
 
     #[test]
