@@ -154,8 +154,14 @@ impl Scans {
         let source = &configuration.source;
         if !gyre_recording::is_recording(&source.data) {
             let (from, data) = (source.from.name(), configuration.data());
+            let fault = match data.is_empty() {
+                true => format!("none is named: name it, as in `gyre run NAME.mcap --from {from}`"),
+                false => format!(
+                    "{data} is no such recording: `gyre record` and `gyre run --record` make one"
+                ),
+            };
             return Err(format!(
-                "--from {from} (source.from) plays the messages of a recorded run, and {data} is no such recording: `gyre record` and `gyre run --record` make one"
+                "--from {from} (source.from) plays the messages of a recorded run, and {fault}"
             )
             .into());
         }
