@@ -142,6 +142,9 @@ fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
         0 => String::new(),
         earlier => format!("; {earlier} had been computed before"),
     };
-    let plural = if drives == 1 { "" } else { "s" };
-    format!("{drives} drive{plural}: {each}{earlier}")
+    match drives {
+        0 => "no drives".to_owned(),
+        1 => format!("1 drive: {each}{earlier}"),
+        _ => format!("{drives} drives: {each}{earlier}"),
+    }
 }
