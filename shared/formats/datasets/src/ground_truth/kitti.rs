@@ -34,8 +34,8 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     })
 }
 
-/// Parses a file of Boreas. Its poses have roll and pitch: they are inverted in space, and projected
-/// to the plane at last.
+/// Parses a file of Boreas. Its poses have roll and pitch: they are inverted in space, and
+/// projected to the plane at last.
 fn parse_boreas(text: &str) -> Result<Trajectory, LineError> {
     let (stamps, matrices) = stamped(lines(text), |line, row| {
         let missing = "the first column is not a time, as in the first line";
