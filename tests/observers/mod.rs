@@ -5,5 +5,6 @@ mod page;
 pub mod record;
 mod record_live;
 mod record_moved;
+mod record_parts;
 mod shadow;
 mod undisturbed;

@@ -4,7 +4,10 @@ use std::{thread, time::Duration};
 
 use rustix::process::Signal;
 
-use crate::common::{Browser, Run, Running, Server};
+use crate::{
+    common::{Browser, Run, Running, Server},
+    operate::commands::ask,
+};
 
 /// A drive that is still going on when a test ends it.
 fn long() -> Run {
@@ -72,6 +75,23 @@ fn other_machines_need_the_token_and_this_one_none() {
     assert!(status(&server.get("/metrics", &[&bearer])).contains("200"));
     server.interrupt();
     interrupt(running);
+}
+
+#[test]
+fn a_folder_without_a_run_is_named_with_how_one_is_started() {
+    let run = Run::of_recording();
+    let no_run = format!("no run is writing to {}", run.out().display());
+    let refused = |end: &str| {
+        let sentence = format!("{end}: `gyre run` starts one, and its --out names the folder");
+        let ended = ask(&run, &["watch", "--listen", "127.0.0.1:0"]);
+        ended.refused_with(&[&no_run, &sentence]);
+    };
+    let nothing = run.out().display().to_string();
+    refused(&nothing);
+    std::fs::create_dir(run.out()).unwrap();
+    refused(&nothing);
+    run.complete();
+    refused("the run is complete)");
 }
 
 const RESTARTS: &str = "gyre_process_restarts_total{process=\"refinement\"}";

@@ -55,6 +55,15 @@ fn a_run_with_slam_has_the_same_odometry_and_logs_the_keyframes_of_its_poses() {
 }
 
 #[test]
+fn keyframes_are_the_same_bytes_with_one_scan_in_flight_and_without_places_for_observers() {
+    for setting in ["run.window=1", "run.observers=0"] {
+        let run = run().set(setting);
+        run.complete();
+        require_undisturbed(&run, setting);
+    }
+}
+
+#[test]
 fn a_run_without_refinement_logs_keyframes_too() {
     let run = run().set("refinement.kind=none");
     run.complete();

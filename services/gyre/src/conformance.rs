@@ -1,6 +1,6 @@
 //! `gyre conformance`: tests whether a program keeps the contract of a stage.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::{Args, builder::PossibleValuesParser};
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
@@ -37,20 +37,24 @@ pub struct ConformanceArguments {
     pub same_as_own: bool,
     /// The 99th percentile of the work on an item must be at most this, ms; of fewer than a hundred
     /// items the maximum. The first four do not count.
-    #[arg(long, value_name = "MS")]
-    pub budget_ms: Option<f64>,
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
+    pub budget_ms: Option<Duration>,
     /// Time for the program to open its topics, s.
-    #[arg(long, default_value_t = 30.0, value_name = "S")]
-    pub start_timeout_s: f64,
+    #[arg(long, default_value = "30", value_name = "S", value_parser = seconds)]
+    pub start_timeout_s: Duration,
     /// Time for the program to answer an item, or to refuse it, s.
-    #[arg(long, default_value_t = 10.0, value_name = "S")]
-    pub patience_s: f64,
+    #[arg(long, default_value = "10", value_name = "S", value_parser = seconds)]
+    pub patience_s: Duration,
     /// Time for the program to exit after SIGTERM, s. A run gives it 2 s.
-    #[arg(long, default_value_t = 2.0, value_name = "S")]
-    pub stop_timeout_s: f64,
+    #[arg(long, default_value = "2", value_name = "S", value_parser = seconds)]
+    pub stop_timeout_s: Duration,
     /// Print JSON instead of a table.
     #[arg(long)]
     pub json: bool,
+}
+
+fn milliseconds(text: &str) -> Result<Duration, &'static str> {
+    seconds(text).map(|seconds| seconds / 1000)
 }
 
 /// The shape of the program's messages matters, not the accuracy.
@@ -75,7 +79,6 @@ pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure
 
 fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> {
     let stage = StageId::by_name(&arguments.stage).ok_or("there is no such stage")?;
-    let demands = demands(arguments)?;
     let configuration = configuration(arguments, stage)?;
     let command = command(arguments, &configuration, stage)?;
     preflight::check_open_files()?;
@@ -103,7 +106,13 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             Some(recording) => recording.listing.write(root),
             None => Ok(()),
         }),
-        demands,
+        demands: Demands {
+            start_timeout: arguments.start_timeout_s,
+            item_timeout: arguments.patience_s,
+            stop_timeout: arguments.stop_timeout_s,
+            same_as_own: arguments.same_as_own,
+            budget: arguments.budget_ms,
+        },
     };
     let signals = Signals::install()?;
     let mut observe = |what: &str| {
@@ -126,19 +135,6 @@ fn print(report: &Report, as_json: bool) -> Result<ExitCode, Failure> {
         (true, _) => ExitCode::SUCCESS,
         (false, 0) => ExitCode::from(NOT_TESTED),
         (false, _) => ExitCode::FAILURE,
-    })
-}
-
-fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
-    let budget = arguments
-        .budget_ms
-        .map(|ms| seconds("--budget-ms", ms / 1e3));
-    Ok(Demands {
-        start_timeout: seconds("--start-timeout-s", arguments.start_timeout_s)?,
-        item_timeout: seconds("--patience-s", arguments.patience_s)?,
-        stop_timeout: seconds("--stop-timeout-s", arguments.stop_timeout_s)?,
-        same_as_own: arguments.same_as_own,
-        budget: budget.transpose()?,
     })
 }
 

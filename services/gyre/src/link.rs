@@ -6,7 +6,7 @@ use gyre_messages::Footprint;
 use gyre_results::Out;
 use gyre_run::LinkConfig;
 use gyre_stage::{run::sweep, wake::Signals};
-use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds};
+use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
 use crate::{
     cli::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
@@ -22,9 +22,8 @@ pub fn link(end: &LinkEnd) -> Result<ExitCode, Failure> {
 }
 
 fn send(arguments: &SendArguments) -> Result<ExitCode, Failure> {
-    let linger = seconds("--linger-s", arguments.linger_s)?;
     let link = link_of(&arguments.network);
-    let sent = gyre_link::send(&arguments.out, &link, &arguments.topics, linger)?;
+    let sent = gyre_link::send(&arguments.out, &link, &arguments.topics, arguments.linger_s)?;
     print::note(format_args!("gyre link: {sent}"));
     if sent.is_incomplete {
         print::note(

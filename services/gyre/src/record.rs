@@ -1,6 +1,6 @@
 //! `gyre record`: records a running run, from outside or as a process of it.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 use gyre_recorder::{Options, Split};
@@ -22,8 +22,8 @@ pub struct RecordArguments {
     #[arg(long, default_value_t = 0, value_name = "MB")]
     pub split_mb: u64,
     /// Time of the sensor before the recording continues in the next file, s; 0: any.
-    #[arg(long, default_value_t = 0.0, value_name = "S")]
-    pub split_s: f64,
+    #[arg(long, default_value = "0", value_name = "S", value_parser = seconds)]
+    pub split_s: Duration,
     /// Continue with the next part of the recording if there is one (as `gyre run` starts it).
     #[arg(long, hide = true)]
     pub continues: bool,
@@ -39,8 +39,7 @@ pub fn recording(text: &str) -> Result<PathBuf, String> {
 
 pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     let bytes = arguments.split_mb.saturating_mul(1_000_000);
-    let span_ns = seconds("--split-s", arguments.split_s)?.as_nanos();
-    let span_ns = i64::try_from(span_ns).unwrap_or(i64::MAX);
+    let span_ns = i64::try_from(arguments.split_s.as_nanos()).unwrap_or(i64::MAX);
     let options = Options {
         out: arguments.run.folder()?,
         to: arguments.to.clone(),

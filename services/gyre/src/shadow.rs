@@ -1,7 +1,7 @@
 //! `gyre shadow`: runs a second program beside a stage of a running run, and compares their
 //! results.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
@@ -31,8 +31,8 @@ pub struct ShadowArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub scans: Option<u64>,
     /// Time after which it ends, s.
-    #[arg(long, value_name = "S")]
-    pub duration: Option<f64>,
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub duration: Option<Duration>,
     /// Write shadow.json, shadow.csv with a row for each item, and the program's output,
     /// shadow.txt, to this folder.
     #[arg(long, value_name = "DIR")]
@@ -41,11 +41,11 @@ pub struct ShadowArguments {
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(i32).range(-20..=19))]
     pub nice: i32,
     /// Time for the program to open its topics, s.
-    #[arg(long, default_value_t = 30.0, value_name = "S")]
-    pub start_timeout_s: f64,
+    #[arg(long, default_value = "30", value_name = "S", value_parser = seconds)]
+    pub start_timeout_s: Duration,
     /// Time for the program to answer an item, s.
-    #[arg(long, default_value_t = 10.0, value_name = "S")]
-    pub patience_s: f64,
+    #[arg(long, default_value = "10", value_name = "S", value_parser = seconds)]
+    pub patience_s: Duration,
     /// Print JSON instead of a table.
     #[arg(long)]
     pub json: bool,
@@ -114,7 +114,6 @@ fn options(arguments: &ShadowArguments, stage: StageId) -> Result<Options, Failu
     let gyre = own().to_string_lossy().into_owned();
     let own = || StageConfig::own_command(&gyre, stage.name(), arguments.python.as_deref());
     let command = arguments.command.as_deref().map(words);
-    let duration = arguments.duration.map(|it| seconds("--duration", it));
     Ok(Options {
         stage,
         command: command.transpose()?.unwrap_or_else(own),
@@ -122,10 +121,10 @@ fn options(arguments: &ShadowArguments, stage: StageId) -> Result<Options, Failu
             nice: Some(arguments.nice),
             ..Scheduling::default()
         },
-        start_timeout: seconds("--start-timeout-s", arguments.start_timeout_s)?,
-        item_timeout: seconds("--patience-s", arguments.patience_s)?,
+        start_timeout: arguments.start_timeout_s,
+        item_timeout: arguments.patience_s,
         scans: arguments.scans,
-        duration: duration.transpose()?,
+        duration: arguments.duration,
         report: arguments.report.clone(),
     })
 }

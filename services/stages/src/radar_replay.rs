@@ -43,8 +43,14 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let options: DatasetOptions = launch.section("dataset")?;
     // The supervisor has opened it before, so whatever is wrong now may pass. It has resolved the
     // options too: a dataset.toml that is changed during a run does not change the run.
-    let root = &launch.manifest.root;
-    let open = || open(root, &config, &options).map_err(|error| error.to_string());
+    let (root, room) = (&launch.manifest.root, launch.manifest.limits.scan_bytes);
+    let open = || match open(root, &config, &options) {
+        Ok(dataset) if dataset.limits().bytes > room => Err(format!(
+            "the scans of {} have become larger than when the run began (start it again when the recording is complete)",
+            config.data.display()
+        )),
+        opened => opened.map_err(|error| error.to_string()),
+    };
     let mut dataset = source::open(launch, &config, open)?;
     let (gyro, wheels): (GyroConfig, WheelsConfig) =
         (launch.section("gyro")?, launch.section("wheels")?);

@@ -31,10 +31,10 @@ pub struct Summary {
     pub duration_s: f64,
 }
 
-/// Writes the dataset of `config` to the folder `out` on `threads` threads, by
-/// default one for each processor, and calls `progress(done, total)` for each image. The files do not depend on the number of threads. Images
-/// of an earlier call with the same configuration are kept; the first and the last of them are
-/// compared with newly rendered ones.
+/// Writes the dataset of `config` to the folder `out` on `threads` threads, by default one for each
+/// processor, and calls `progress(done, total)` for each image. The files do not depend on the
+/// number of threads. Images of an earlier call with the same configuration are kept; the first and
+/// the last of them are compared with newly rendered ones.
 pub fn write_dataset(
     config: &SimulationConfig,
     out: &Path,

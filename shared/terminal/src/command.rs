@@ -35,7 +35,8 @@ pub fn words(command: &str) -> Result<Vec<String>, Failure> {
     }
 }
 
-pub fn seconds(option: &str, seconds: f64) -> Result<Duration, Failure> {
-    Duration::try_from_secs_f64(seconds)
-        .map_err(|_| format!("{option} is {seconds}, but must be 0 or more").into())
+/// Parses a duration of the command line, s.
+pub fn seconds(text: &str) -> Result<Duration, &'static str> {
+    let seconds = text.parse().unwrap_or(f64::NAN);
+    Duration::try_from_secs_f64(seconds).map_err(|_| "it must be a number, 0 or more")
 }

@@ -1,8 +1,9 @@
 //! The arguments of `gyre link`.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
 use clap::{Args, Subcommand};
+use gyre_terminal::seconds;
 
 /// The ends of a link.
 #[derive(Debug, Subcommand)]
@@ -23,8 +24,8 @@ pub struct SendArguments {
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
     /// Time to wait, after the end of the run, for receivers that have not everything yet, s.
-    #[arg(long, default_value_t = 60.0, value_name = "S")]
-    pub linger_s: f64,
+    #[arg(long, default_value = "60", value_name = "S", value_parser = seconds)]
+    pub linger_s: Duration,
     #[command(flatten)]
     pub network: NetworkArguments,
 }

@@ -29,6 +29,8 @@ pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
 pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
+/// The most requests of a topic that are answered at once. A receiver has one of each topic.
+const MAX_REQUESTS: usize = 64;
 
 /// The answer that means that no message follows.
 pub(crate) const ENDED: &str = "ended";
@@ -150,6 +152,10 @@ impl Offer {
         let Some(from) = parameters.get(FROM).and_then(|from| from.parse().ok()) else {
             return;
         };
+        // Each thread that answers has a reference.
+        if Arc::strong_count(&self) > MAX_REQUESTS {
+            return;
+        }
         let place = Place {
             seq: from,
             generation: parameters.get(GENERATION).and_then(|it| it.parse().ok()),

@@ -7,8 +7,9 @@ const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
 
-/// Returns the percentiles of the poses of the last minute, ms: of sensor to pose, and of each stage
-/// the hand-over, from the publication by the stage before to the start of the work, and the work.
+/// Returns the percentiles of the poses of the last minute, ms: of sensor to pose, and of each
+/// stage the hand-over, from the publication by the stage before to the start of the work, and the
+/// work.
 pub fn report<'a>(items: impl Iterator<Item = &'a Item>, now_ns: i64) -> Value {
     let items = items.filter(|item| finished_ns(item) >= now_ns - WINDOW_NS);
     let items: Vec<&Item> = items.collect();

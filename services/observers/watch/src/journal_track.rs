@@ -1,10 +1,14 @@
 //! The poses of a run for its track, in order and each once: the journal has those that were there
-//! before the observer, and those that it has missed.
+//! before the observer, and those that it has missed. They are read a part at a time, while the
+//! newest ones are shown: the journal of a month has gigabytes.
 
 use std::path::{Path, PathBuf};
 
 use gyre_journal as journal;
 use gyre_messages::PoseHeader;
+
+/// Poses that are read at once: about a megabyte.
+const PART: usize = 2000;
 
 pub(crate) struct JournalTrack {
     journal: PathBuf,
@@ -20,10 +24,11 @@ impl JournalTrack {
     }
 
     /// Adds a pose that was published, after the poses of the journal between it and the track.
-    pub fn see(&mut self, pose: &PoseHeader, mut add: impl FnMut(&PoseHeader)) {
+    /// True if these were too many at once: the same pose again adds more.
+    pub fn see(&mut self, pose: &PoseHeader, mut add: impl FnMut(&PoseHeader)) -> bool {
         let seq = pose.item.seq;
         if seq < self.next {
-            return;
+            return false;
         }
         if seq > self.next {
             let records = journal::records_from(&self.journal, self.next);
@@ -31,10 +36,15 @@ impl JournalTrack {
             // Poses that the journal lacks are not drawn.
             let before = records.map_while(Result::ok);
             let before = before.take_while(|before| before.item.seq < seq);
-            before.for_each(|before| add(&before));
+            let read = before.take(PART).inspect(&mut add).count();
+            if read == PART {
+                self.next += PART as u64;
+                return true;
+            }
         }
         add(pose);
         self.next = seq + 1;
+        false
     }
 }
 
@@ -64,14 +74,17 @@ mod tests {
         let path = journal::path(out.path());
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         let mut journal = Journal::open(&path).unwrap();
-        (0..2000).for_each(|seq| journal.append(&pose(seq)).unwrap());
+        let poses = 2 * PART as u64 + 10;
+        (0..poses).for_each(|seq| journal.append(&pose(seq)).unwrap());
         let mut track = JournalTrack::of(out.path());
         let mut drawn = Vec::new();
-        // The observer fails after the first, attaches again, and is sent the last poses again.
-        for seq in [1990, 1989, 1990, 1995, 1999, 1999, 2000] {
-            track.see(&pose(seq), |pose| drawn.push(pose.item.seq));
+        assert!(track.see(&pose(poses - 10), |pose| drawn.push(pose.item.seq)));
+        assert_eq!(drawn.len(), PART);
+        // The observer fails after the second, attaches again, and is sent the last poses again.
+        for before in [10, 10, 11, 10, 5, 1, 1, 0] {
+            while track.see(&pose(poses - before), |pose| drawn.push(pose.item.seq)) {}
         }
-        assert_eq!(drawn, (0..=2000).collect::<Vec<u64>>());
+        assert_eq!(drawn, (0..=poses).collect::<Vec<u64>>());
     }
 
     #[test]
@@ -80,7 +93,7 @@ mod tests {
         let mut track = JournalTrack::of(out.path());
         let mut drawn = Vec::new();
         for seq in [5, 6, 9, 8] {
-            track.see(&pose(seq), |pose| drawn.push(pose.item.seq));
+            assert!(!track.see(&pose(seq), |pose| drawn.push(pose.item.seq)));
         }
         assert_eq!(drawn, [5, 6, 9]);
     }

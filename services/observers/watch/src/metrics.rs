@@ -184,6 +184,59 @@ mod tests {
         assert!(text.contains(delays) && text.ends_with("# EOF\n"), "{text}");
     }
 
+    /// The text of a run with a live radar and a gyro.
+    fn of_sensors(mut counts: RunCounts) -> String {
+        counts.samples.gyro_hz = Some(208.0);
+        let source = Process {
+            name: "radar-replay".to_owned(),
+            received: Some(Received::default()),
+            cpu_s: Some(1.5),
+            own_bytes: Some(4096),
+            ..Process::default()
+        };
+        let mut registry = Registry::with_prefix("gyre");
+        registry.register_collector(Box::new(Snapshot {
+            is_up: true,
+            counts,
+            processes: vec![source],
+        }));
+        let mut text = String::new();
+        assert!(encode(&mut text, &registry).is_ok());
+        text
+    }
+
+    #[test]
+    fn each_sample_stands_behind_the_help_and_the_type_of_its_family() {
+        let view = view();
+        for text in [scrape(&view), of_sensors(view.counts())] {
+            let (mut help, mut family, mut kind) = ("", "", "");
+            let mut families = Vec::new();
+            for line in text.lines() {
+                if let Some(rest) = line.strip_prefix("# HELP ") {
+                    let (name, sentence) = rest.split_once(' ').unwrap_or_default();
+                    assert!(sentence.len() > 5 && !families.contains(&name), "{line}");
+                    families.push(name);
+                    help = name;
+                } else if let Some(rest) = line.strip_prefix("# TYPE ") {
+                    (family, kind) = rest.split_once(' ').unwrap_or_default();
+                    assert_eq!(family, help, "{line}");
+                } else if !line.starts_with('#') {
+                    let name = line.split(['{', ' ']).next().unwrap_or_default();
+                    let endings: &[&str] = match kind {
+                        "counter" => &["_total"],
+                        "histogram" => &["_bucket", "_sum", "_count"],
+                        "info" => &["_info"],
+                        _ => &[""],
+                    };
+                    let ending = name.strip_prefix(family);
+                    assert!(ending.is_some_and(|it| endings.contains(&it)), "{line}");
+                }
+            }
+            assert!(families.len() > 12, "{families:?}");
+            assert!(text.ends_with("\n# EOF\n"), "{text}");
+        }
+    }
+
     #[test]
     fn what_motions_rest_on_and_what_sensors_have_delivered_is_counted() {
         let view = view();

@@ -8,7 +8,7 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws};
-use gyre_messages::{Masked, Message, Objects, Pose, Scan};
+use gyre_messages::{Masked, Message, Objects, Pose, PoseHeader, Scan};
 use gyre_stage::{
     StageError,
     observer::{Next, ObservedRun},
@@ -109,15 +109,23 @@ fn follow_poses(
     let has_samples = run.manifest().limits.samples > 0;
     let mut scans = has_samples.then(|| run.observe::<Scan>().ok()).flatten();
     view.set_notice(None);
+    let mut newest: Option<PoseHeader> = None;
     while !view.is_stopping() {
-        match poses.next(POLL_INTERVAL)? {
+        let see = |newest: &PoseHeader| track.see(newest, |pose| view.add_to_track(pose));
+        let is_behind = newest.as_ref().is_some_and(see);
+        let limit = match is_behind {
+            true => Duration::ZERO,
+            false => POLL_INTERVAL,
+        };
+        match poses.next(limit)? {
             Next::Message(message, missed) => {
                 view.add_missed(Pose::TOPIC, missed);
-                let pose = message.header();
-                view.add_pose(pose);
-                track.see(pose, |pose| view.add_to_track(pose));
+                view.add_pose(message.header());
+                newest = Some(*message.header());
             }
             Next::Idle => {}
+            // First the remaining poses of the journal.
+            Next::Ended if is_behind => {}
             Next::Ended => break,
         }
         if let Some(scans) = &mut scans {

@@ -123,3 +123,102 @@ impl Intake {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use gyre_colossus::{
+        ByteOrder, ClockFormat, Datagrams, Event, Message, Powers, asterix::write_azimuth,
+    };
+
+    use super::*;
+
+    const START_NS: i64 = 1_700_000_000_000_000_000;
+    const AZIMUTHS: u16 = 400;
+    /// In two datagrams.
+    const BINS: u16 = 2000;
+    const ENCODER: u16 = 5600;
+    const ROOM: usize = AZIMUTHS as usize * BINS as usize;
+
+    /// The datagrams of each turn of a radar, two for each azimuth.
+    fn turns(count: u16) -> Vec<Vec<Vec<u8>>> {
+        let radar = Configuration {
+            azimuth_samples: AZIMUTHS,
+            bin_size: 438,
+            range_in_bins: BINS,
+            encoder_size: ENCODER,
+            rotation_mhz: 4000,
+            ..Configuration::default()
+        };
+        let clock = ClockFormat {
+            order: ByteOrder::Big,
+            ..ClockFormat::default()
+        };
+        let (mut number, mut stamp_ns) = (0, START_NS);
+        let mut turns = vec![Vec::new(); usize::from(count)];
+        for sent in &mut turns {
+            for row in 0..AZIMUTHS {
+                let (seconds, split_seconds) = clock.fields(stamp_ns);
+                let azimuth = Azimuth {
+                    sweep_counter: 0,
+                    encoder: row * 14,
+                    seconds,
+                    split_seconds,
+                    powers: Powers::Eight(&[7; BINS as usize]),
+                };
+                let mut send = |datagram: &[u8]| sent.push(datagram.to_vec());
+                write_azimuth(&radar, &azimuth, &mut number, &mut send);
+                stamp_ns += 625_000;
+            }
+        }
+        turns
+    }
+
+    /// Returns the number of scans of these datagrams, and what was counted.
+    fn received(sent: &[Vec<u8>]) -> (usize, Received) {
+        let mut parser = Datagrams::new(ENCODER);
+        let mut intake = Intake::new(DatasetOptions::default());
+        let (mut header, mut bytes) = (ScanHeader::default(), vec![0; ROOM]);
+        let mut scans = 0;
+        for datagram in sent {
+            parser.space()[..datagram.len()].copy_from_slice(datagram);
+            parser.filled(datagram.len());
+            while let Some(event) = parser.next() {
+                match event {
+                    Event::Message(Message::Azimuth(azimuth)) => {
+                        let is_scan = intake.add(azimuth, START_NS, &mut header, &mut bytes);
+                        scans += usize::from(is_scan);
+                    }
+                    Event::Message(Message::Configuration(radar)) => {
+                        assert!(intake.configure(radar, ROOM).unwrap());
+                    }
+                    other => panic!("{other:?}"),
+                }
+            }
+        }
+        (scans, intake.received())
+    }
+
+    #[test]
+    fn lost_datagrams_are_counted_by_their_azimuths_and_turns_and_doubled_ones_are_not() {
+        let mut turns = turns(5);
+        assert!(turns.iter().all(|sent| sent.len() == 800));
+        // Doubled right away, and after an azimuth.
+        for at in [700, 301] {
+            let again = turns[2][at].clone();
+            turns[2].insert(at + 1, again.clone());
+            turns[2].insert(at + 5, again);
+        }
+        let (scans, whole) = received(&turns.concat());
+        assert_eq!((scans, whole.missing_azimuths), (5, 0));
+        assert_eq!((whole.scans_left_out, whole.damaged_messages), (0, 0));
+        // The first part of an azimuth, the second one of another, both of a third.
+        for at in [601, 600, 401, 20] {
+            turns[1].remove(at);
+        }
+        turns[3].clear();
+        let (scans, lossy) = received(&turns.concat());
+        assert_eq!((scans, lossy.missing_azimuths), (4, 3));
+        assert_eq!((lossy.scans_left_out, lossy.damaged_messages), (1, 0));
+    }
+}

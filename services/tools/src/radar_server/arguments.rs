@@ -1,10 +1,13 @@
 //! The arguments of `gyre radar-server`.
 
-use std::net::{Ipv4Addr, SocketAddrV4};
+use std::{
+    net::{Ipv4Addr, SocketAddrV4},
+    time::Duration,
+};
 
 use clap::Args;
 use gyre_run::Rate;
-use gyre_terminal::inputs::Inputs;
+use gyre_terminal::{inputs::Inputs, seconds};
 
 use crate::radar_server::server::Faults;
 
@@ -26,8 +29,8 @@ pub struct RadarServerArguments {
     pub interface: Ipv4Addr,
     /// Time before the first scan for which only the radar's description of itself is sent by UDP,
     /// s.
-    #[arg(long, default_value_t = 0.0, value_name = "S", requires = "udp")]
-    pub wait_s: f64,
+    #[arg(long, default_value = "0", value_name = "S", value_parser = seconds, requires = "udp")]
+    pub wait_s: Duration,
     /// Pace: realtime, max (as fast as it is read), or a factor.
     #[arg(long, default_value = "realtime")]
     pub rate: Rate,

@@ -1,12 +1,16 @@
 //! Poses in space, with roll and pitch.
 
-use std::fs;
+use std::{fmt::Write, fs};
 
 use crate::common::assert_refused;
 use gyre_datasets::{TrajectoryError, read_trajectory};
 use gyre_geometry::{Pose, pose};
 use gyre_radar::Trajectory;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+
+const START_US: i64 = 1_630_597_331_000_000;
+/// A place in UTM, m.
+const CORNER_M: [f64; 3] = [623_422.85, 4_848_820.47, 153.98];
 
 fn read(text: &str) -> Result<Trajectory, TrajectoryError> {
     let folder = tempfile::tempdir().unwrap();
@@ -68,11 +72,38 @@ fn assert_near(found: &[Pose], expected: &[Pose], apart_m: f64) {
 }
 
 #[test]
-fn poses_with_times_in_place_of_an_index_are_refused() {
+fn boreas_odometry_is_inverted_in_space_and_then_projected() {
+    let corner = Translation3::from(Vector3::from(CORNER_M));
+    let drive: Vec<_> = drive(0.3).iter().map(|pose| corner * pose).collect();
+    let mut text = String::new();
+    for (k, pose) in drive.iter().enumerate() {
+        let line = kitti_line(&pose.inverse());
+        let _ = write!(text, "{} {line}", START_US + 100_000 * k as i64);
+    }
+    let found = read(&text).unwrap();
+    assert_near(&found.poses, &planar(&drive), 1e-5);
+    assert_eq!(found.stamp_ns.unwrap()[1], (START_US + 100_000) * 1000);
+}
+
+/// Where the world is the first frame of a sensor with y to the right and z down.
+#[test]
+fn boreas_odometry_from_the_first_frame_is_mirrored() {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let drive = drive(0.3);
+    let first = drive[0].inverse();
+    let drive: Vec<_> = drive.iter().map(|pose| first * pose).collect();
+    let mut text = String::new();
+    for (k, pose) in drive.iter().enumerate() {
+        let line = kitti_line(&(down * pose.inverse() * down));
+        let _ = write!(text, "{} {line}", START_US + 100_000 * k as i64);
+    }
+    assert_near(&read(&text).unwrap().poses, &planar(&drive), 1e-9);
+}
+
+#[test]
+fn an_index_before_the_poses_is_skipped() {
     let line = kitti_line(&Isometry3::identity());
-    let refused = read(&format!("1630597331000000 {line}"));
-    assert_refused(refused, "the first of its 13 columns is a time");
-    assert!(read(&format!("7 {line}")).is_ok());
+    assert!(read(&format!("7 {line}")).unwrap().stamp_ns.is_none());
 }
 
 #[test]
@@ -102,5 +133,20 @@ fn poses_of_no_known_frame_are_refused() {
     let tilted: Vec<_> = drive(0.9).iter().map(|pose| axes * pose).collect();
     for text in [kitti(&tilted), tum(&tilted)] {
         assert_refused(read(&text), "does not stay upright");
+    }
+}
+
+/// On a straight road, a camera stays upright about each axis.
+#[test]
+fn poses_of_a_camera_are_refused() {
+    // x to the right, y down, z forward.
+    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    let axes = UnitQuaternion::from_matrix(&axes);
+    for bend in [0.0, 0.02, 0.9] {
+        let camera = |pose: &Isometry3<f64>| axes * pose * axes.inverse();
+        let camera: Vec<_> = drive(bend).iter().map(camera).collect();
+        for text in [kitti(&camera), tum(&camera)] {
+            assert_refused(read(&text), "turn the poses of a camera");
+        }
     }
 }

@@ -82,8 +82,9 @@ pub struct RecordingWriter {
     /// The newest time of the sensor when this file had its first message, which may be of an
     /// earlier scan: topics lag behind `scan`.
     first_ns: Option<i64>,
-    /// The newest log lines that came before the first message.
+    /// The newest log lines that came before the first message, and the number of older ones.
     early: VecDeque<LogLine>,
+    left_out: u64,
 }
 
 /// Returns the header of a message: the sensor's time, and when it was received.
@@ -138,6 +139,7 @@ impl RecordingWriter {
             newest_ns: None,
             first_ns: None,
             early: VecDeque::new(),
+            left_out: 0,
         };
         writer.begin(head).map_err(unwritable)?;
         // Its name survives a power failure too.
@@ -219,6 +221,7 @@ impl RecordingWriter {
         if self.newest_ns.is_none() {
             if self.early.len() == MAX_EARLY {
                 self.early.pop_front();
+                self.left_out += 1;
             }
             self.early.push_back(line);
             return Ok(());
@@ -232,7 +235,17 @@ impl RecordingWriter {
     }
 
     fn write_early(&mut self) -> Result<(), McapError> {
-        let mut lines = mem::take(&mut self.early).into_iter();
+        let lines = mem::take(&mut self.early);
+        let left_out = mem::take(&mut self.left_out);
+        let note = lines.front().filter(|_| left_out > 0).map(|line| LogLine {
+            written_ns: line.written_ns,
+            level: "WARN".to_owned(),
+            stage: "recorder".to_owned(),
+            message: format!(
+                "{left_out} lines before the first message are left out: log.jsonl of the run has them"
+            ),
+        });
+        let mut lines = note.into_iter().chain(lines);
         lines.try_for_each(|line| self.write_log(&line))
     }
 

@@ -214,6 +214,49 @@ fn a_part_is_as_long_as_it_is_to_be_although_poses_lag_behind_the_scans() {
     assert_eq!(gyre_recording::parts(&to).len(), 4);
 }
 
+#[test]
+fn a_part_ends_at_its_size_and_each_message_is_in_one_part() {
+    const COUNT: u64 = 2 * SCANS;
+    let folder = tempfile::tempdir().unwrap();
+    let of_two = folder.path().join("of_two.mcap");
+    let mut writer = RecordingWriter::create(&of_two, &head("a", 1)).unwrap();
+    for seq in 0..2 {
+        writer.add(&scan(seq)).unwrap();
+        writer.add(&pose(seq)).unwrap();
+        writer.flush().unwrap();
+    }
+    let bytes = fs::metadata(&of_two).unwrap().len();
+    let split = Split {
+        bytes: Some(bytes),
+        span_ns: None,
+    };
+    let to = folder.path().join("drive.mcap");
+    let mut writer =
+        SplitWriter::create(to.clone(), head("a", 1), split, None, Positions::new()).unwrap();
+    for seq in 0..COUNT {
+        writer.add(&scan(seq)).unwrap();
+        writer.add(&pose(seq)).unwrap();
+        writer.file.flush().unwrap();
+    }
+    writer.file.finish().unwrap();
+    let parts = gyre_recording::parts(&to);
+    // Of two scans each, or three where they are compressed better.
+    assert!(parts.len() as u64 >= COUNT / 3, "{parts:?}");
+    for part in &parts[..parts.len() - 1] {
+        assert!(fs::metadata(part).unwrap().len() >= bytes);
+    }
+    for topic in ["scan", "pose"] {
+        let of_parts = parts.iter().flat_map(|part| seqs(&opened(part), topic));
+        assert!(of_parts.eq(0..COUNT), "{topic}");
+    }
+    for part in &parts {
+        let mut alone = opened(part);
+        assert_eq!(alone.damages().count(), 0, "{}", part.display());
+        let there = seqs(&alone, "scan").len() + seqs(&alone, "pose").len();
+        assert_eq!(read_all(&mut alone), there);
+    }
+}
+
 /// A message of a generation that gives numbers from `numbered_from` on; `scan` distinguishes it
 /// from others of its number.
 fn of(generation: u32, numbered_from: u64, seq: u64, scan: u64) -> Incoming {

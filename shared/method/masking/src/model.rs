@@ -186,7 +186,7 @@ impl Model {
             // No checksum covers the other file.
             true => Err(format!(
                 "{shown} keeps weights in another file, which the SHA-256 of its card does not cover: write them into it, in Python by \
-                 `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card"
+                 `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card; if none are there, it calls something else `location`: rename that"
             )),
         }
     }

@@ -11,7 +11,7 @@ use gyre_colossus::{
     asterix::{write_azimuth, write_description},
 };
 
-use gyre_terminal::{Failure, seconds};
+use gyre_terminal::Failure;
 
 use super::{Faults, clients::Clients, faults::uniform, unserved};
 use crate::radar_server::RadarServerArguments;
@@ -42,7 +42,7 @@ impl Output {
             if arguments.rate.factor().is_none() {
                 return Err("--rate max has no meaning with --udp: the speed at which datagrams are read is unknown; give a factor".into());
             }
-            let wait = seconds("--wait-s", arguments.wait_s)?;
+            let wait = arguments.wait_s;
             let group = Group::open(to, arguments.interface, arguments.faults)?;
             let (output, address) = (Self::Group { group, wait }, format!("udp://{to}"));
             return Ok((output, address, !arguments.interface.is_loopback()));

@@ -175,7 +175,9 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
             "is it another folder?",
         ),
         None => (
-            format!("it holds no PNG images, and none of the folders {folders}"),
+            format!(
+                "it holds no PNG images (unpack archives before), and none of the folders {folders}"
+            ),
             SET_FORMAT,
         ),
     };

@@ -57,7 +57,7 @@ pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
 fn read_list(list: &Path) -> Result<String, OpenError> {
     gyre_storage::read_text(list, MAX_LIST_BYTES).map_err(|source| match source.kind() {
         ErrorKind::NotFound => OpenError::Recording(format!(
-            "there is no {}: it lists the times of the images, which have none of their own; copy it from the dataset",
+            "there is no {}: it lists the times of the files in the folder beside it, which have none of their own; copy it from the dataset",
             list.display()
         )),
         _ => OpenError::io(list, source),

@@ -13,7 +13,7 @@ fn a_file_is_refused_with_what_to_do() {
     let file = root.path().join("radar.zip");
     fs::write(&file, b"PK\x03\x04....").unwrap();
     assert_rejected(&file, "(unpack an archive before)");
-    assert_rejected(root.path(), "is not a known dataset");
+    assert_rejected(root.path(), "(unpack archives before)");
 }
 
 #[test]

@@ -76,3 +76,31 @@ fn a_failure_to_synchronise_is_one_of_the_recording() {
     let writer = RecordingWriter::create_with(&path, &head(1), fails).unwrap();
     writer.finish().unwrap_err();
 }
+
+#[test]
+fn the_newest_early_lines_are_kept_and_the_others_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut writer = RecordingWriter::create(&path, &head(1)).unwrap();
+    for number in 0..MAX_EARLY + 2 {
+        let message = format!("line {number}.");
+        let line = LogLine {
+            message,
+            ..LogLine::default()
+        };
+        writer.add_log(line).unwrap();
+    }
+    writer.add(&pose()).unwrap();
+    writer.finish().unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap();
+    let messages = messages.map(|message| message.unwrap());
+    let logged = messages.filter(|message| message.channel.topic == "/log");
+    let lines: Vec<String> = logged
+        .map(|message| String::from_utf8_lossy(&message.data).into_owned())
+        .collect();
+    assert_eq!(lines.len(), MAX_EARLY + 1);
+    for (line, words) in lines.iter().zip(["2 lines before", "line 2.", "line 3."]) {
+        assert!(line.contains(words), "{line}");
+    }
+}

@@ -88,7 +88,8 @@ impl PlanesNetwork {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];
         let computed = self.engine.compute(shape, planes, |given, values| {
-            (given.to_vec(), values.into_owned())
+            let given: Vec<_> = given.iter().map(|side| *side as usize).collect();
+            (given, values.into_owned())
         });
         let (given, values) = computed.map_err(|reason| failed(self.name, reason))?;
         match given.strip_prefix(&[1]) == Some(&self.given) {
@@ -111,12 +112,13 @@ impl Engine {
         Self::Rten(Box::new(model), Arc::new(ThreadPool::with_num_threads(1)))
     }
 
-    /// Computes a network. `take` gets the shape and the values of its output.
+    /// Computes a network, and allocates nothing but what the libraries do. `take` gets the shape
+    /// and the values of its output.
     pub fn compute<T>(
         &mut self,
         shape: [usize; 4],
         planes: &[f32],
-        take: impl FnOnce(&[usize], Cow<'_, [f32]>) -> T,
+        take: impl FnOnce(&[i64], Cow<'_, [f32]>) -> T,
     ) -> Result<T, String> {
         match self {
             Self::OnnxRuntime(session) => {
@@ -124,8 +126,7 @@ impl Engine {
                     let input = TensorRef::from_array_view((shape, planes))?;
                     let outputs = session.run(ort::inputs![input])?;
                     let (shape, values) = outputs[0].try_extract_tensor::<f32>()?;
-                    let shape: Vec<_> = shape.iter().map(|side| *side as usize).collect();
-                    Ok(take(&shape, values.into()))
+                    Ok(take(shape, values.into()))
                 };
                 compute().map_err(|error| one_line(error.message()))
             }
@@ -137,7 +138,7 @@ impl Engine {
                     Ok(output.into_shape_vec::<f32, 4>()?)
                 };
                 let (shape, values) = guarded(run)?;
-                Ok(take(&shape, values.into()))
+                Ok(take(&shape.map(|side| side as i64), values.into()))
             }
         }
     }

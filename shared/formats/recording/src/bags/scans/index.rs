@@ -82,15 +82,15 @@ impl Index {
 
     /// Returns why no scan on a topic can be read; `None` if one can be.
     pub fn why_none_can_be_read(&self, topic: &str) -> Option<String> {
-        let can_be = self.entries.iter().any(|entry| entry.damage.is_none());
-        let notes: Vec<String> = self.notes();
-        let notes: Vec<&str> = notes.iter().map(|it| it.trim_end_matches('.')).collect();
-        let (azimuths, notes) = (self.azimuths, notes.join("; "));
-        (!can_be).then(|| {
-            format!(
-                "has no complete turn of the radar on {topic} that can be read, and {azimuths} azimuths: {notes}"
-            )
-        })
+        if self.entries.iter().any(|entry| entry.damage.is_none()) {
+            return None;
+        }
+        let (azimuths, notes) = (self.azimuths, self.notes());
+        let notes = notes.iter().map(|note| note.trim_end_matches('.'));
+        let why: String = notes.map(|note| format!("; {note}")).collect();
+        Some(format!(
+            "has no complete turn of the radar on {topic} that can be read, and {azimuths} azimuths{why}"
+        ))
     }
 
     pub fn notes(&self) -> Vec<String> {

@@ -1,0 +1,62 @@
+//! Parts of a recording that ends a file by its size or its time: each is read by itself, and each
+//! message is in one of them.
+
+use std::{fs, path::PathBuf, slice};
+
+use gyre_recording::{Recording, parts};
+
+use super::record::{ALL, file, played, recorded, seqs};
+use crate::common::{gyre, recording::SCANS, undisturbed};
+
+/// Reads each part by itself; returns the numbers of the messages of a topic, part by part.
+fn seqs_in(parts: &[PathBuf], topic: &str) -> Vec<u64> {
+    let mut all = Vec::new();
+    for part in parts {
+        let mut alone = Recording::open(slice::from_ref(part)).unwrap();
+        assert_eq!(alone.damages().count(), 0, "{}", part.display());
+        for seq in seqs(&alone, topic) {
+            alone.read(topic, seq).unwrap();
+            all.push(seq);
+        }
+    }
+    all
+}
+
+#[test]
+fn a_recording_goes_on_in_the_next_file_and_each_message_is_in_one_of_them() {
+    for (setting, least_bytes) in [("record.split_s=0.7", 1), ("record.split_mb=1", 1_000_000)] {
+        let run = recorded(&played()).set(ALL).rate("2").set(setting);
+        assert_eq!(run.complete(), undisturbed(), "{setting}");
+        let parts = parts(&file(&run));
+        assert!(parts.len() > 1, "{setting}");
+        assert_eq!(parts[1], run.folder().join("drive.2.mcap"));
+        for part in &parts[..parts.len() - 1] {
+            let bytes = fs::metadata(part).unwrap().len();
+            assert!(bytes >= least_bytes, "{setting}: {bytes}");
+        }
+        for topic in ["scan", "masked", "rotation", "motion", "refined", "pose"] {
+            let all: Vec<u64> = (0..SCANS as u64).collect();
+            assert_eq!(seqs_in(&parts, topic), all, "{setting}: {topic}");
+        }
+    }
+}
+
+#[test]
+fn a_recorder_from_outside_goes_on_in_the_next_file_too() {
+    let run = played().rate("1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let mut record = gyre();
+    record.arg("record").arg(run.out()).arg("--to");
+    record.arg(file(&run)).args(["--split-s", "0.7"]);
+    let mut recorder = record.spawn().unwrap();
+    running.finish().succeeded();
+    assert!(recorder.wait().unwrap().success());
+    let parts = parts(&file(&run));
+    assert!(parts.len() > 1, "{parts:?}");
+    for topic in ["scan", "pose"] {
+        let seqs = seqs_in(&parts, topic);
+        let all: Vec<u64> = (seqs[0]..SCANS as u64).collect();
+        assert_eq!(seqs, all, "{topic}");
+    }
+}
