@@ -13,7 +13,7 @@ use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
 use gyre_tools::conformance::{Candidate, Demands, Report, Test, check};
 
-use crate::{cli::RunArguments, preflight, program, run::resolve};
+use crate::{arguments::RunArguments, preflight, program, run::resolve};
 
 #[derive(Debug, Args)]
 pub struct ConformanceArguments {

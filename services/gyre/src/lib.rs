@@ -2,6 +2,7 @@
 //!
 //! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`], [`plan`].
 
+pub mod arguments;
 pub mod batch;
 pub mod calibrate;
 pub mod cli;
@@ -34,7 +35,8 @@ use std::{path::PathBuf, process::ExitCode};
 use gyre_configuration::{Configuration, schema};
 use gyre_terminal::{Failure, inputs::Inputs, print};
 
-use cli::{Command, RunArguments};
+use arguments::RunArguments;
+use cli::Command;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;

@@ -9,7 +9,7 @@ use gyre_stage::{run::sweep, wake::Signals};
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
 use crate::{
-    cli::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
+    arguments::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
     preflight, split,
 };
 

@@ -12,7 +12,7 @@ use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake:
 use gyre_stages::live_radar::Sizes;
 use gyre_terminal::{Failure, print};
 
-use crate::cli::Ros2Arguments;
+use crate::arguments::Ros2Arguments;
 
 pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     // A wrong folder is reported at once.

@@ -27,7 +27,7 @@ use gyre_terminal::{Failure, INTERRUPTED, execute_again, own, print};
 use gyre_tools::operate::detach_if_asked;
 
 use crate::{
-    cli::RunArguments,
+    arguments::RunArguments,
     earlier::{self, Begun, Earlier},
     notify::Notifier,
     plan,

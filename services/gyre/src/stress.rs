@@ -16,7 +16,7 @@ use gyre_tools::stress::{
     Options, Others, Provenance, Report, TestedPipeline, report::Verdict, witness_fault,
 };
 
-use crate::{cli::RunArguments, preflight, program, run::resolve, simulate};
+use crate::{arguments::RunArguments, preflight, program, run::resolve, simulate};
 
 #[derive(Debug, Args)]
 pub struct StressArguments {

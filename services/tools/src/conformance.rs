@@ -33,13 +33,15 @@ pub use rule::{Rule, Verdict};
 use checks::Examination;
 use reference::{Context, Reference};
 
+/// Writes the other files of a run's root, as the list of a recording's files.
+type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
+
 /// A program that is to keep the contract of a stage, and its limits.
 pub struct Test {
     /// The program. Each of its runs writes to a folder below its manifest's `out`.
     pub candidate: Candidate,
     pub stages: Vec<StageId>,
-    /// Writes the other files of a run's root, as the list of a recording's files.
-    pub prepare: Box<dyn Fn(&Path) -> io::Result<()>>,
+    pub prepare: Prepare,
     pub demands: Demands,
 }
 

@@ -16,7 +16,7 @@ use gyre_tools::batch::{End, Outcome};
 use rustix::process::Signal;
 
 use crate::{
-    cli::RunArguments,
+    arguments::RunArguments,
     earlier::{self, Earlier},
     program,
     run::{self, resolve},

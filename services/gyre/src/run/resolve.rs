@@ -9,7 +9,7 @@ use gyre_terminal::inputs::Given;
 use gyre_terminal::{Failure, print};
 
 use super::results_folder;
-use crate::cli::RunArguments;
+use crate::arguments::RunArguments;
 
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;

@@ -6,7 +6,7 @@ use gyre_messages::{FollowerId, Message, Pose, Sender, StageId, Topic, Window};
 use crate::{
     StageError,
     follower::LogId,
-    transport::{Event, Node, Service},
+    transport::{Event, Node, Service, data_event, handshake_event},
 };
 
 /// All services of a run. They exist as long as this value.
@@ -56,12 +56,4 @@ impl Services {
         let mut topics = self.topics.iter();
         topics.any(|(topic, service)| is_sent(topic) && service.has_publisher())
     }
-}
-
-pub(crate) fn data_event(topic: &str) -> String {
-    format!("{topic}_data")
-}
-
-pub(crate) fn handshake_event(topic: &str) -> String {
-    format!("{topic}_handshake")
 }

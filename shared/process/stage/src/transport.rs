@@ -3,9 +3,7 @@
 //! and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other languages.
 
 mod event;
-pub mod reader;
 mod service;
-pub mod writer;
 
 use std::{fmt::Debug, path::Path};
 
@@ -27,10 +25,18 @@ pub(crate) use event::bind_alone;
 pub use event::{Listener, Notifier};
 pub use service::Service;
 
-type Ipc = ipc::Service;
+pub(crate) type Ipc = ipc::Service;
 /// Stands for a header of any type. It has no bytes itself.
-type AnyHeader = CustomHeaderMarker;
-type AnyPayload = [CustomPayloadMarker];
+pub(crate) type AnyHeader = CustomHeaderMarker;
+pub(crate) type AnyPayload = [CustomPayloadMarker];
+
+pub(crate) fn data_event(topic: &str) -> String {
+    format!("{topic}_data")
+}
+
+pub(crate) fn handshake_event(topic: &str) -> String {
+    format!("{topic}_handshake")
+}
 
 #[derive(Clone)]
 pub struct Transport(Config);

@@ -157,13 +157,19 @@ impl Child {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
+    /// Returns whether the process is a stage that has not opened its topics.
+    pub fn is_starting(&self, run: &Run<'_>) -> bool {
+        let stage = self.stage();
+        stage.is_some_and(|stage| !run.services.has_publisher(stage))
+    }
+
     /// Returns its state as `gyre ps` shows it; its activity is `otherwise` if it writes no
     /// heartbeat.
     pub fn status(&self, run: &Run<'_>, otherwise: Activity) -> ProcessStatus {
         let beat = self.heartbeat(run.manifest());
         let activity = match beat {
             _ if self.is_known_to_have_exited() => Activity::Ended,
-            _ if run.is_starting(self) => Activity::Starting,
+            _ if self.is_starting(run) => Activity::Starting,
             None => otherwise,
             Some(beat) if beat.is_silent() => Activity::Silent,
             Some(beat) => match beat.activity {

@@ -54,7 +54,7 @@ impl Processes {
 
     /// Returns the stage that has been opening its topics for longest.
     pub fn starting(&self, run: &Run<'_>) -> Option<&Child> {
-        let opening = self.iter().filter(|child| run.is_starting(child));
+        let opening = self.iter().filter(|child| child.is_starting(run));
         opening.min_by_key(|child| child.started)
     }
 
@@ -64,7 +64,7 @@ impl Processes {
         let child = &self[process];
         let beat = child.heartbeat(run.manifest());
         !child.is_known_to_have_exited()
-            && !run.is_starting(child)
+            && !child.is_starting(run)
             && beat.is_some_and(|beat| beat.hangs(since))
     }
 

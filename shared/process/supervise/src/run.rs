@@ -11,8 +11,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Event, Plan, SuperviseError, child::Child, guardian::Guardian, start::Starter,
-    wake_limit::WakeLimit,
+    Event, Plan, SuperviseError, guardian::Guardian, start::Starter, wake_limit::WakeLimit,
 };
 
 /// The plan of a run, and its processes' needs for start, observation and cleanup.
@@ -24,7 +23,7 @@ pub(crate) struct Run<'a> {
     pub guardian: Guardian,
     _wake_limit: Option<WakeLimit>,
     // Dropped in this order: services, node.
-    services: Services,
+    pub services: Services,
     pub node: Node,
     pub transport: Transport,
     pub signals: Signals,
@@ -77,12 +76,6 @@ impl<'a> Run<'a> {
         if !sentence.is_empty() {
             self.say(Event::Note(sentence));
         }
-    }
-
-    /// Returns whether a process is a stage that has not opened its topics.
-    pub fn is_starting(&self, child: &Child) -> bool {
-        let stage = child.stage();
-        stage.is_some_and(|stage| !self.services.has_publisher(stage))
     }
 
     /// Sleeps until a process ends, or `limit` has passed; true on a request to stop.

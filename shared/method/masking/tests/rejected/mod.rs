@@ -166,7 +166,7 @@ fn settings_of_onnx_runtime_are_rejected_for_rten() {
 
 #[test]
 fn unknown_backends_are_rejected_with_the_known_ones() {
-    let read = |text| toml::from_str::<MaskingConfig>(text);
+    let read = |text: &str| toml::from_str::<MaskingConfig>(text);
     for name in ["tract", "onyx"] {
         let sentence = read(&format!("backend = \"{name}\"")).unwrap_err();
         let words = format!("unknown variant `{name}`, expected one of `auto`");

@@ -14,8 +14,8 @@ use super::{AnyHeader, AnyPayload, Ipc, Node, service_name};
 use crate::StageError;
 
 pub struct Service {
-    pub(super) topic: Topic,
-    pub(super) factory: publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>,
+    pub(crate) topic: Topic,
+    pub(crate) factory: publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>,
 }
 
 impl Service {

@@ -40,7 +40,7 @@ impl Swaps {
             return;
         };
         let child = &processes[trial.process];
-        if run.is_starting(child) {
+        if child.is_starting(run) {
             trial.since = Instant::now();
         }
         match () {

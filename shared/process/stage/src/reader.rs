@@ -9,8 +9,13 @@ use iceoryx2::{
     sample::Sample,
 };
 
-use super::{AnyHeader, AnyPayload, Ipc, Listener, Node, Notifier, Service};
-use crate::{Launch, Manifest, StageError, clock, message::RecordedMessage, services};
+use crate::{
+    Launch, Manifest, StageError, clock,
+    message::RecordedMessage,
+    transport::{
+        AnyHeader, AnyPayload, Ipc, Listener, Node, Notifier, Service, data_event, handshake_event,
+    },
+};
 
 type Bytes = Sample<Ipc, AnyPayload, AnyHeader>;
 
@@ -156,7 +161,7 @@ impl<M> Port<M> {
         node: &Node,
         manifest: &Manifest,
     ) -> Result<Self, StageError> {
-        let data = Listener::open(node, &services::data_event(topic.name))?;
+        let data = Listener::open(node, &data_event(topic.name))?;
         Ok(Self {
             topic,
             limits: manifest.limits,
@@ -190,7 +195,7 @@ impl<M> Port<M> {
 
 /// Notifies the publisher of a topic, which then connects to its new readers.
 pub(crate) fn notify_publisher(node: &Node, topic: &str) -> Result<(), StageError> {
-    Notifier::open(node, &services::handshake_event(topic))?.notify()
+    Notifier::open(node, &handshake_event(topic))?.notify()
 }
 
 /// The items of a topic in order, each once: the current and the previous one.

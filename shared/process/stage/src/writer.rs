@@ -10,12 +10,13 @@ use iceoryx2::{
 };
 use rustix::fs::{FallocateFlags, fallocate};
 
-use super::{AnyHeader, AnyPayload, Ipc, Listener, Node, Notifier, Service};
 use crate::{
     Launch, Manifest, StageError, clock,
     message::{AnyMessage, RecordedMessage},
     run::{self, SHARED_MEMORY},
-    services,
+    transport::{
+        AnyHeader, AnyPayload, Ipc, Listener, Node, Notifier, Service, data_event, handshake_event,
+    },
 };
 
 /// Publishes the messages of a topic and keeps a history for late readers: see
@@ -58,8 +59,8 @@ impl<M: Message> Writer<M> {
 impl<M> Writer<M> {
     /// Publishes a topic of messages `M`.
     pub fn to(topic: &Topic, node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
-        let handshake = Listener::open(node, &services::handshake_event(topic.name))?;
-        let data = Notifier::open(node, &services::data_event(topic.name))?;
+        let handshake = Listener::open(node, &handshake_event(topic.name))?;
+        let data = Notifier::open(node, &data_event(topic.name))?;
         // Last, since a publisher connects to all existing readers at once.
         let service = Service::open(node, topic)?;
         let sizes = (topic.sizes)(&manifest.window);
