@@ -333,7 +333,6 @@ fn what_cannot_have_a_shadow_is_refused_in_a_sentence() {
         ("steering", "no stage `steering`"),
         ("masking", "no run is writing to"),
         ("masking --command 'x", "quotes"),
-        ("masking --patience-s nan", "0 or more"),
     ] {
         let arguments: Vec<&str> = arguments.split(' ').collect();
         refused(&run, &arguments, &[words]);

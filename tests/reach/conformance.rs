@@ -182,7 +182,5 @@ fn a_command_that_cannot_be_tested_is_refused_in_a_sentence() {
     };
     let unclosed = ["masking", "--command", "python3 'x"];
     refused(&unclosed, &["--command", "quotes"]);
-    let nan = ["masking", "--patience-s", "nan"];
-    refused(&nan, &["--patience-s", "0 or more"]);
     refused(&["masking", "no.toml"], &["no.toml"]);
 }

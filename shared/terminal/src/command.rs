@@ -40,3 +40,16 @@ pub fn seconds(text: &str) -> Result<Duration, &'static str> {
     let seconds = text.parse().unwrap_or(f64::NAN);
     Duration::try_from_secs_f64(seconds).map_err(|_| "it must be a number, 0 or more")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_that_is_no_duration_is_refused() {
+        assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
+        for text in ["nan", "inf", "-1", "1e30", "soon", ""] {
+            assert!(seconds(text).is_err(), "{text}");
+        }
+    }
+}

@@ -86,14 +86,23 @@ impl Journal {
     /// Returns the last poses, at most `count`, oldest first, and whether the end of the stream
     /// follows them.
     pub fn last(&self, count: usize) -> Result<(Vec<PoseHeader>, bool), JournalError> {
-        // One record more, which may be the end.
-        let more = (count as u64).saturating_add(1);
-        let first = self.records.saturating_sub(more);
-        let records = records_from(self.file.file.path(), first)?;
-        let poses: Result<Vec<_>, _> = records.into_iter().flatten().collect();
-        let mut poses = poses?;
-        let ended = poses.pop_if(|last| last.item.is(flag::END)).is_some();
-        poses.drain(..poses.len().saturating_sub(count));
+        let mut poses = Vec::with_capacity(count);
+        let mut ended = false;
+        let mut bytes = [0; RECORD];
+        for index in (0..self.records).rev() {
+            if poses.len() == count {
+                break;
+            }
+            let whole = self.file.read(&RECORDS, index, &mut bytes)?;
+            let record = Record::decode(&bytes, index).filter(|_| whole);
+            let damaged = || JournalError::damaged(self.file.file.path(), index);
+            let pose = record.ok_or_else(damaged)?.pose;
+            match pose.item.is(flag::END) {
+                true => ended = true,
+                false => poses.push(pose),
+            }
+        }
+        poses.reverse();
         Ok((poses, ended))
     }
 

@@ -26,7 +26,8 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 pub(crate) struct Recorder {
     child: Child,
-    /// True when it has ended for good.
+    /// `None` while it runs, and when it has ended for good.
+    restart_at: Option<Instant>,
     has_ended: bool,
     restarts: usize,
 }
@@ -54,6 +55,7 @@ impl Recorder {
         }
         Ok(Some(Self {
             child,
+            restart_at: None,
             has_ended: false,
             restarts: 0,
         }))
@@ -71,19 +73,24 @@ impl Recorder {
         if self.has_ended || !self.child.has_exited() {
             return Ok(());
         }
-        run.guardian.forget(self.child.pid());
+        match self.restart_at {
+            Some(restart_at) if Instant::now() < restart_at => return Ok(()),
+            Some(_) => return self.respawn(run, newest),
+            None => run.guardian.forget(self.child.pid()),
+        }
         let death = self.child.death();
-        let sentence = match self.child.may_restart(&death) {
+        let may_restart = self.child.may_restart(&death);
+        let sentence = match may_restart {
             // It was asked to stop.
             _ if death.code == Some(0) => death.last_output.unwrap_or_default(),
             Err(error) => error.to_string(),
             Ok(()) => {
+                self.restart_at = Some(Instant::now() + RESTART_BACKOFF);
                 run.note(&format!(
                     "the recorder died ({}), and is started again: it continues in a different file",
                     death.cause
                 ));
-                run.pause(RESTART_BACKOFF)?;
-                return self.respawn(run, newest);
+                return Ok(());
             }
         };
         self.has_ended = true;
@@ -92,7 +99,7 @@ impl Recorder {
     }
 
     fn respawn(&mut self, run: &mut Run<'_>, newest: Option<u64>) -> Result<(), SuperviseError> {
-        self.has_ended = false;
+        (self.restart_at, self.has_ended) = (None, false);
         self.restarts += 1;
         let respawned = self.child.respawn(&run.starter(), newest);
         match respawned {
@@ -111,6 +118,11 @@ impl Recorder {
         run: &mut Run<'_>,
         ending: Option<Ending>,
     ) -> Result<(), SuperviseError> {
+        if self.restart_at.is_some() {
+            run.note(
+                "the recorder died, and the run ended before it was started again: the end of the recording is missing",
+            );
+        }
         let limit = match ending {
             Some(Ending::Complete) => END_TIMEOUT,
             _ => STOP_TIMEOUT,
@@ -142,7 +154,7 @@ impl Recorder {
     /// Asks the recorder to write its received messages, and kills it if it has not finished after
     /// `limit`.
     fn end(&mut self, run: &mut Run<'_>, limit: Duration) -> Result<(), SuperviseError> {
-        if self.has_ended {
+        if self.has_ended || self.restart_at.is_some() {
             return Ok(());
         }
         self.child.terminate();
