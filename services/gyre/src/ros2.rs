@@ -25,8 +25,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
         out: absolute(&run)?,
         domain,
         namespace: arguments.namespace.clone(),
-        frames: arguments.frames.frames.clone(),
-        mounting: arguments.frames.mounting.parse()?,
+        vehicle: arguments.frames.vehicle()?,
         transforms: !arguments.no_tf,
         map: (!arguments.no_map).then_some(map_settings),
     })?;

@@ -10,18 +10,17 @@ use std::{
 };
 
 use gyre_geometry::Pose;
-use gyre_ros2_messages::frames::Frames;
+use gyre_ros2_messages::Vehicle;
 use gyre_stage::clock;
 
-use crate::{Mounting, clock::offset_ns};
+use crate::clock::offset_ns;
 
 /// The longest wait between two looks at the run.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub struct Shared {
     pub out: PathBuf,
-    pub frames: Frames,
-    pub mounting: Mounting,
+    pub vehicle: Vehicle,
     stopping: AtomicBool,
     state: Mutex<RunState>,
 }
@@ -95,11 +94,10 @@ pub enum RunPhase {
 }
 
 impl Shared {
-    pub fn new(out: PathBuf, frames: Frames, mounting: Mounting) -> Self {
+    pub fn new(out: PathBuf, vehicle: Vehicle) -> Self {
         Self {
             out,
-            frames,
-            mounting,
+            vehicle,
             stopping: AtomicBool::new(false),
             state: Mutex::default(),
         }

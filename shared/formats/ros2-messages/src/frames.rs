@@ -69,7 +69,7 @@ impl Default for Frames {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
+pub(crate) struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
     /// the earlier frame.
     pub motion: UncertainMotion,
@@ -85,7 +85,7 @@ pub struct Interval {
 /// covariance that follows from the motion's. The velocity of a predicted motion has the variance
 /// [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
 /// zero, with the same variance.
-pub fn odometry(
+pub(crate) fn odometry(
     stamp_ns: i64,
     frames: &Frames,
     pose: &UncertainMotion,
@@ -159,7 +159,7 @@ fn seconds(since: &Interval) -> f64 {
 }
 
 /// Returns the pose of the frame `inner` in the frame `outer`.
-pub fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
+pub(crate) fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
     let geometry_msgs::Pose {
         position: Point { x, y, z },
         orientation: rotation,

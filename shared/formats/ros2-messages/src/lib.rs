@@ -16,6 +16,7 @@ pub mod radar;
 pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod tf2_msgs;
+mod vehicle;
 pub mod vision_msgs;
 pub mod visualization_msgs;
 
@@ -23,3 +24,4 @@ pub use cdr::{BadMessage, decode, encode};
 pub use definition::{Definition, Ros2Message};
 pub use domain::{Domain, DomainError};
 pub use mounting::Mounting;
+pub use vehicle::Vehicle;

@@ -8,8 +8,7 @@ use gyre_messages::ListedObject;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::{
-    Mounting,
-    frames::{self, Frames},
+    Mounting, Vehicle, frames,
     geometry_msgs::{self, Covariance, PoseWithCovariance, Vector3},
     std_msgs::{ColorRGBA, Header},
     vision_msgs::{
@@ -34,13 +33,9 @@ const LETTER_M: f64 = 1.2;
 /// The covariance of a pose is the covariance of the centre along the axes of `odom`. The heading
 /// has none in Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`].
 /// Boxes have no height, for the same reason.
-pub fn detections(
-    stamp_ns: i64,
-    frames: &Frames,
-    mounting: &Mounting,
-    objects: &[ListedObject],
-) -> Detection3DArray {
-    let header = Header::new(stamp_ns, &frames.odom);
+pub fn detections(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> Detection3DArray {
+    let mounting = &vehicle.mounting;
+    let header = Header::new(stamp_ns, &vehicle.frames.odom);
     let detection = |object: &ListedObject| {
         let pose = frames::pose(&place(mounting, object));
         let class_id = if object.is_moving() { MOVING } else { STANDING };
@@ -69,13 +64,9 @@ pub fn detections(
 /// Returns the objects of a scan as shapes: a box of 1.6 m height, the displacement of a second as
 /// an arrow if the object moves, and the identity as a text. The shapes of the scan before are
 /// removed.
-pub fn markers(
-    stamp_ns: i64,
-    frames: &Frames,
-    mounting: &Mounting,
-    objects: &[ListedObject],
-) -> MarkerArray {
-    let header = Header::new(stamp_ns, &frames.odom);
+pub fn markers(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> MarkerArray {
+    let mounting = &vehicle.mounting;
+    let header = Header::new(stamp_ns, &vehicle.frames.odom);
     let mut markers = vec![Marker {
         action: DELETEALL,
         ..Marker::default()
