@@ -10,7 +10,7 @@ use crate::{
     tf2_msgs::TFMessage,
 };
 
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Vehicle {
     pub frames: Frames,
     pub mounting: Mounting,

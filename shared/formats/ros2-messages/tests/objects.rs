@@ -46,6 +46,13 @@ fn header() -> ObjectsHeader {
     header
 }
 
+fn vehicle() -> Vehicle {
+    Vehicle {
+        frames: "map,odom,base_link,radar".parse().unwrap(),
+        mounting: "0,0,0".parse().unwrap(),
+    }
+}
+
 fn close(found: &[f64], expected: &[f64]) {
     let far = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-12;
     assert_eq!(found.len(), expected.len());
@@ -62,7 +69,7 @@ fn place(pose: &Pose) -> [f64; 3] {
 #[test]
 fn objects_are_detections_with_identity_class_box_and_covariance() {
     let header = header();
-    let array = detections(STAMP_NS, &Vehicle::default(), header.list());
+    let array = detections(STAMP_NS, &vehicle(), header.list());
     assert_eq!(array.header.stamp.ns(), STAMP_NS);
     assert_eq!(array.header.frame_id, "odom");
     let [car, standing] = &array.detections[..] else {
@@ -115,7 +122,7 @@ fn objects_are_where_they_are_from_the_vehicle_whose_radar_looks_elsewhere() {
 fn markers_are_boxes_with_identities_and_arrows_of_what_moves() {
     let mut header = header();
     header.list[0].vx_mps = -9.0;
-    let shapes = markers(STAMP_NS, &Vehicle::default(), header.list()).markers;
+    let shapes = markers(STAMP_NS, &vehicle(), header.list()).markers;
     let kinds: Vec<(i32, i32)> = shapes.iter().map(|it| (it.r#type, it.id)).collect();
     let expected = [
         (CUBE, 0),
