@@ -32,7 +32,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     let out = run.display();
     print::note(format_args!(
         "gyre: {out} is published in domain {} of ROS 2",
-        domain.id()
+        domain.id
     ));
     if domain.is_open() {
         print::note(
@@ -66,7 +66,6 @@ pub fn receive(
     source: &SourceConfig,
     options: &DatasetOptions,
 ) -> Result<StageCounters, StageError> {
-    let settings = source::Settings::of(source, options);
-    let settings = settings.map_err(|error| StageError::Input(error.to_string()))?;
+    let settings = source::Settings::of(source, options).map_err(StageError::Input)?;
     source::run(launch, settings)
 }

@@ -11,7 +11,7 @@ mod wakeups;
 use std::time::Duration;
 
 use gyre_datasets::DatasetOptions;
-use gyre_ros2_messages::{Domain, DomainError};
+use gyre_ros2_messages::Domain;
 use gyre_run::SourceConfig;
 use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
@@ -48,7 +48,7 @@ pub struct Settings {
 impl Settings {
     /// Returns the settings of the section `[source]`, with the constants of the section
     /// `[dataset]`.
-    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, DomainError> {
+    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, String> {
         let interface = Some(source.interface.as_str()).filter(|address| !address.is_empty());
         Ok(Self {
             domain: Domain::new(source.domain, interface)?,

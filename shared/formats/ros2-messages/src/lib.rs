@@ -20,8 +20,8 @@ mod vehicle;
 pub mod vision_msgs;
 pub mod visualization_msgs;
 
-pub use cdr::{BadMessage, decode, encode};
+pub use cdr::{decode, encode};
 pub use definition::{Definition, Ros2Message};
-pub use domain::{Domain, DomainError};
+pub use domain::Domain;
 pub use mounting::Mounting;
 pub use vehicle::Vehicle;

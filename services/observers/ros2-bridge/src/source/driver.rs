@@ -4,7 +4,7 @@ use std::os::fd::BorrowedFd;
 
 use gyre_colossus::Azimuth;
 use gyre_ros2_messages::{
-    BadMessage, Definition, Ros2Message,
+    Definition, Ros2Message,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     nav_msgs::Odometry,
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
@@ -65,7 +65,7 @@ impl PacketMessage {
     }
 
     /// Returns the only azimuth; `None` of a turn.
-    pub fn azimuth(&self) -> Result<Option<Azimuth<'_>>, BadMessage> {
+    pub fn azimuth(&self) -> Result<Option<Azimuth<'_>>, String> {
         match self {
             Self::Azimuth(message) => Ok(Some(message.azimuth())),
             Self::Bytes(message) => message.azimuth().map(Some),
@@ -167,7 +167,7 @@ impl Driver {
 
     /// Takes the next configuration. A reader also receives messages of the other type, and may
     /// decode them to meaningless numbers: the published type decides.
-    pub fn configuration(&self) -> Result<Option<DescribedRadar>, BadMessage> {
+    pub fn configuration(&self) -> Result<Option<DescribedRadar>, String> {
         if let Ok(Some((message, _))) = self.configurations.take()
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
         {
