@@ -220,13 +220,15 @@ impl Sensor for Radar {
     const HOP: StageId = StageId::RadarReplay;
 
     fn connection(&self) -> Option<BorrowedFd<'_>> {
-        Some(self.driver.descriptor())
+        Some(self.driver.wakeups.descriptor())
     }
 
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
         let is_received = self.driver.receive()?;
-        self.driver.clear()?;
-        self.driver.pass_fixes_on();
+        self.driver.wakeups.clear()?;
+        if let Some(fixes) = &mut self.driver.fixes {
+            fixes.pass_on();
+        }
         self.take_configuration(bytes.len())?;
         if let Some((turn, rows)) = self.turn.take()
             && self.add_turn(turn, rows, header, bytes)
@@ -257,10 +259,7 @@ impl Sensor for Radar {
 
     fn sample(&mut self, of: SampleKind) -> Option<Sample> {
         self.driver.sample_wakeups.clear().ok()?;
-        match of {
-            SampleKind::Gyro => self.driver.gyro_sample(),
-            SampleKind::Wheels => self.driver.wheel_sample(),
-        }
+        self.driver.sample(of)
     }
 
     fn due_ns(&self) -> Option<i64> {
