@@ -79,11 +79,10 @@ struct Trajectory<'a> {
     vehicle: &'a Vehicle,
     odometry: Topic<Odometry>,
     transforms: Topic<TFMessage>,
-    fixed: Topic<TFMessage>,
+    /// The topic of the mounting, until the first pose.
+    fixed: Option<Topic<TFMessage>>,
     /// Of a run that tracks objects, from the first scan that has them.
     objects: Option<(Topic<Detection3DArray>, Topic<MarkerArray>)>,
-    /// True if the mounting has been written.
-    is_mounted: bool,
 }
 
 impl<'a> Trajectory<'a> {
@@ -92,17 +91,15 @@ impl<'a> Trajectory<'a> {
             vehicle,
             odometry: bag.topic("/odom", Kept::ForNobody)?,
             transforms: bag.topic("/tf", Kept::ForNobody)?,
-            fixed: bag.topic("/tf_static", Kept::ForLater)?,
+            fixed: Some(bag.topic("/tf_static", Kept::ForLater)?),
             objects: None,
-            is_mounted: false,
         })
     }
 
     fn write(&mut self, bag: &mut BagWriter, place: &Place) -> Result<(), Failure> {
         let (vehicle, stamp_ns) = (self.vehicle, place.stamp_ns());
-        if !self.is_mounted {
-            bag.write(&self.fixed, stamp_ns, &vehicle.mounted(stamp_ns))?;
-            self.is_mounted = true;
+        if let Some(fixed) = self.fixed.take() {
+            bag.write(&fixed, stamp_ns, &vehicle.mounted(stamp_ns))?;
         }
         let corrected = place.map_from_odometry.as_ref();
         let transforms = vehicle.transforms(stamp_ns, &place.pose, corrected);

@@ -172,7 +172,7 @@ impl PoseTopics {
             if !state.poses.count(pose.item.seq) {
                 return;
             }
-            let stamp_ns = stamp_ns(&mut state, pose.item.stamp_ns, say);
+            let stamp_ns = state.stamp_ns(pose.item.stamp_ns, say);
             (stamp_ns, state.map_from_odometry)
         };
         let (vehicle, mut unsent) = (&shared.vehicle, 0);
@@ -185,17 +185,6 @@ impl PoseTopics {
     }
 }
 
-/// Returns a time of the run as a time of ROS, and reports the first difference between the two.
-fn stamp_ns(state: &mut RunState, time_ns: i64, say: fn(&str)) -> i64 {
-    let (stamp_ns, is_first) = state.stamp_ns(time_ns);
-    if is_first && stamp_ns != time_ns {
-        say(
-            "the times of this run do not count from 1970: its stamps in ROS begin with this computer's time at the first pose",
-        );
-    }
-    stamp_ns
-}
-
 impl ObjectTopics {
     /// Publishes the objects of a scan, even an empty list.
     fn publish(&mut self, shared: &Shared, header: &ObjectsHeader, say: fn(&str)) {
@@ -205,7 +194,7 @@ impl ObjectTopics {
             if !state.objects.count(header.item.seq) {
                 return;
             }
-            stamp_ns(&mut state, header.item.stamp_ns, say)
+            state.stamp_ns(header.item.stamp_ns, say)
         };
         let (vehicle, listed) = (&shared.vehicle, header.list());
         let detections = objects::detections(stamp_ns, vehicle, listed);

@@ -33,10 +33,10 @@ pub struct ScanWriter {
     lost: Lost,
     rows: PlacedRows,
     messages: ScanMessages,
-    configuration: Topic<RadarConfigurationMsg>,
+    /// Its topic, until the first scan.
+    configuration: Option<Topic<RadarConfigurationMsg>>,
     azimuths: Option<Topic<RadarFftDataMsg>>,
     b_scans: Option<Topic<RadarBScanMsg>>,
-    is_described: bool,
 }
 
 #[derive(Debug, Default)]
@@ -167,7 +167,7 @@ impl ScanWriter {
         Ok(Some(Self {
             losses,
             messages: ScanMessages::new(radar, frame),
-            configuration,
+            configuration: Some(configuration),
             azimuths,
             b_scans: b_scans.transpose()?,
             lost: source.lost()?,
@@ -175,7 +175,6 @@ impl ScanWriter {
             scan,
             first: Some(first),
             scans,
-            is_described: false,
         }))
     }
 
@@ -206,10 +205,9 @@ impl ScanWriter {
         let (Some(first_ns), Some(last_ns)) = (stamps.first(), stamps.last()) else {
             return Ok(scan.geometry.stamp_ns);
         };
-        if !self.is_described {
+        if let Some(topic) = self.configuration.take() {
             let message = self.messages.configuration(*first_ns);
-            bag.write(&self.configuration, *first_ns, &message)?;
-            self.is_described = true;
+            bag.write(&topic, *first_ns, &message)?;
         }
         if let Some(topic) = &self.azimuths {
             for message in self.messages.azimuths(scan) {

@@ -100,17 +100,15 @@ impl Radar {
         if !self.intake.is_configured() {
             self.estimate(&packet.message, arrival_ns, bytes.len())?;
         }
+        if let PacketMessage::Turn(turn) = packet.message {
+            return Ok(self.add_turn(turn, 0, header, bytes));
+        }
         match packet.message.azimuth() {
-            Ok(Some(azimuth)) => {
-                return Ok(self.intake.add(azimuth, arrival_ns, header, bytes));
-            }
+            Ok(Some(azimuth)) => return Ok(self.intake.add(azimuth, arrival_ns, header, bytes)),
             Ok(None) => {}
             Err(error) => self.intake.damaged(error, 0),
         }
-        Ok(match packet.message {
-            PacketMessage::Turn(turn) => self.add_turn(turn, 0, header, bytes),
-            _ => false,
-        })
+        Ok(false)
     }
 
     /// Adds the rows of a turn from number `from` on; true if a scan is complete. Without a

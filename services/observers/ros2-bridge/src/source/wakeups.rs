@@ -18,7 +18,6 @@ const CAPACITY: usize = 4;
 pub struct Wakeups {
     poll: Poll,
     events: Events,
-    topics: usize,
 }
 
 impl Wakeups {
@@ -26,7 +25,6 @@ impl Wakeups {
         Ok(Self {
             poll: Poll::new().map_err(failed)?,
             events: Events::with_capacity(CAPACITY),
-            topics: 0,
         })
     }
 
@@ -34,12 +32,12 @@ impl Wakeups {
     where
         Subscription<M>: Source,
     {
-        let token = Token(self.topics);
-        self.topics += 1;
-        self.poll
+        // All topics are read after an event of one.
+        let registered = self
+            .poll
             .registry()
-            .register(topic, token, Interest::READABLE)
-            .map_err(failed)
+            .register(topic, Token(0), Interest::READABLE);
+        registered.map_err(failed)
     }
 
     pub fn descriptor(&self) -> BorrowedFd<'_> {
