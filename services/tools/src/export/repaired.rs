@@ -32,7 +32,7 @@ const OPTIONS: &str = "dataset.toml";
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
 pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
-    let Some(configuration) = source.configuration() else {
+    let Some(configuration) = &source.run else {
         return Err(
             "where azimuths were lost is known from a run: name the folder of its results".into(),
         );

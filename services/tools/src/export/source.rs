@@ -31,14 +31,9 @@ use crate::maps::map;
 
 pub struct Source {
     path: PathBuf,
-    kind: Kind,
-}
-
-enum Kind {
-    /// The folder of a run's results.
-    Run(Box<Configuration>),
-    Recording,
-    Dataset,
+    is_recording: bool,
+    /// The configuration of a run, whose folder of results it is.
+    pub run: Option<Configuration>,
 }
 
 /// A pose of a run with what is known of its time.
@@ -74,55 +69,43 @@ pub struct Scans {
 
 impl Source {
     pub fn open(path: &Path) -> Result<Self, Failure> {
-        let kind = match path {
-            path if gyre_recording::is_recording(path) => Kind::Recording,
-            path if map::exists(&journal::path(path))? => {
-                let configuration = Configuration::read(&path.join("config.toml"), &[])?;
-                Kind::Run(Box::new(configuration))
-            }
-            _ => Kind::Dataset,
-        };
+        let is_recording = gyre_recording::is_recording(path);
+        let is_run = !is_recording && map::exists(&journal::path(path))?;
+        let run = is_run.then(|| map::configuration(path)).transpose()?;
         Ok(Self {
             path: path.to_owned(),
-            kind,
+            is_recording,
+            run,
         })
     }
 
-    /// Returns the configuration of a run; `None` of another source.
-    pub fn configuration(&self) -> Option<&Configuration> {
-        match &self.kind {
-            Kind::Run(configuration) => Some(configuration),
-            Kind::Recording | Kind::Dataset => None,
-        }
-    }
-
     pub fn places(&self) -> Result<Places, Failure> {
-        match self.kind {
-            Kind::Run(_) => {
-                let corrected = self.path.join("trajectory_slam.tum");
-                let corrected = corrected.is_file().then(|| read_trajectory(&corrected));
-                let corrected = corrected.transpose()?;
-                let mut tracked = RecordReader::<LoggedObjects>::open(&self.path)?;
-                let mut place = move |pose: PoseHeader| -> Result<Place, Failure> {
-                    let (seq, stamp_ns) = (pose.item.seq as usize, pose.item.stamp_ns);
-                    let near = |it: &Trajectory| it.near(stamp_ns, Trajectory::ROUNDING_NS);
-                    let in_map: Option<Pose> = corrected.as_ref().and_then(near);
-                    let inverse = pose.pose().motion.inverse();
-                    let objects: Option<Vec<ListedObject>> = match seq < tracked.len() {
-                        true => Some(tracked.read(seq)?.objects.iter().map(listed).collect()),
-                        false => None,
-                    };
-                    Ok(Place {
-                        pose,
-                        map_from_odometry: in_map.map(|pose| pose * inverse),
-                        objects,
-                    })
-                };
-                Ok(Box::new(self.poses()?.map(move |pose| place(pose?))))
-            }
-            Kind::Recording => recorded(gyre_recording::open_recording(&self.path)?),
-            Kind::Dataset => Ok(Box::new(iter::empty())),
+        if self.is_recording {
+            return recorded(gyre_recording::open_recording(&self.path)?);
         }
+        if self.run.is_none() {
+            return Ok(Box::new(iter::empty()));
+        }
+        let corrected = self.path.join("trajectory_slam.tum");
+        let corrected = corrected.is_file().then(|| read_trajectory(&corrected));
+        let corrected = corrected.transpose()?;
+        let mut tracked = RecordReader::<LoggedObjects>::open(&self.path)?;
+        let mut place = move |pose: PoseHeader| -> Result<Place, Failure> {
+            let (seq, stamp_ns) = (pose.item.seq as usize, pose.item.stamp_ns);
+            let near = |it: &Trajectory| it.near(stamp_ns, Trajectory::ROUNDING_NS);
+            let in_map: Option<Pose> = corrected.as_ref().and_then(near);
+            let inverse = pose.pose().motion.inverse();
+            let objects: Option<Vec<ListedObject>> = match seq < tracked.len() {
+                true => Some(tracked.read(seq)?.objects.iter().map(listed).collect()),
+                false => None,
+            };
+            Ok(Place {
+                pose,
+                map_from_odometry: in_map.map(|pose| pose * inverse),
+                objects,
+            })
+        };
+        Ok(Box::new(self.poses()?.map(move |pose| place(pose?))))
     }
 
     /// Returns the poses of a run, without the end of the stream.
@@ -139,7 +122,7 @@ impl Source {
     /// source.
     pub fn lost(&self) -> Result<Lost, Failure> {
         let mut lost = Lost::new();
-        if matches!(self.kind, Kind::Run(_)) {
+        if self.run.is_some() {
             for pose in self.poses()? {
                 let item = pose?.item;
                 lost.insert(item.scan, item.lost_azimuths());
@@ -150,7 +133,7 @@ impl Source {
 
     /// Returns the scans; `None` of a run of a radar, which leaves none.
     pub fn scans(&self) -> Result<Option<Scans>, Failure> {
-        if let Kind::Run(configuration) = &self.kind {
+        if let Some(configuration) = &self.run {
             if configuration.is_radar() {
                 return Ok(None);
             }
@@ -168,7 +151,7 @@ impl Source {
                 is_corrected: false,
             }));
         }
-        let is_corrected = matches!(self.kind, Kind::Recording);
+        let is_corrected = self.is_recording;
         let stored = gyre_recording::stored_options(&self.path)?;
         let options = DatasetOptions {
             azimuth_eccentricity_rad: (!is_corrected).then_some(0.0),
@@ -193,10 +176,7 @@ impl Source {
         stamp_ns: i64,
         vehicle: &Vehicle,
     ) -> Result<(), Failure> {
-        let Kind::Run(configuration) = &self.kind else {
-            return Ok(());
-        };
-        if !configuration.slam.is_on() {
+        if !self.run.as_ref().is_some_and(|run| run.slam.is_on()) {
             return Ok(());
         }
         let aside = tempfile::tempdir()?;
