@@ -153,7 +153,7 @@ impl ScanWriter {
         };
         let mut losses = Losses::default();
         let mut scan = OwnedScan::with_limits(scans.dataset.limits());
-        let Some(first) = scans.next(&mut scan, &mut losses)? else {
+        let Some(first) = scans.next(&mut scan, &mut losses.unreadable)? else {
             return Ok(None);
         };
         let radar = losses.radar(&scans, &scan)?;
@@ -181,7 +181,9 @@ impl ScanWriter {
     /// Writes the next scan that can be read, and returns its time; `None` at the end.
     pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
         let next = match self.first.take() {
-            None => self.scans.next(&mut self.scan, &mut self.losses)?,
+            None => self
+                .scans
+                .next(&mut self.scan, &mut self.losses.unreadable)?,
             first => first,
         };
         next.map(|index| self.write(index, bag)).transpose()
@@ -222,11 +224,12 @@ impl ScanWriter {
 }
 
 impl Scans {
-    /// Reads the next scan that can be read, and returns its number; `None` at the end.
-    fn next(
+    /// Reads the next scan that can be read, counts those before it, and returns its number; `None`
+    /// at the end.
+    pub fn next(
         &mut self,
         scan: &mut OwnedScan,
-        losses: &mut Losses,
+        unreadable: &mut u64,
     ) -> Result<Option<usize>, Failure> {
         while let Some(index) = self.played.next() {
             match self.read(index, scan) {
@@ -234,7 +237,7 @@ impl Scans {
                 Err(error @ ReadError::Io { .. }) => return Err(error.into()),
                 Err(error) => {
                     print::note(format_args!("scan {index} is left out: {error}"));
-                    losses.unreadable += 1;
+                    *unreadable += 1;
                 }
             }
         }
