@@ -91,17 +91,17 @@ impl Driver {
         let topic = settings.configuration_topic();
         let mut sample_wakeups = Wakeups::new()?;
         let gyro = settings.gyro_topic.as_deref();
-        let gyro = gyro.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
+        let gyro = gyro.map(|it| sample_wakeups.subscribe(&mut node, it, SAMPLES, true));
         let wheels = settings.wheels_topic.as_deref();
-        let wheels = wheels.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
+        let wheels = wheels.map(|it| sample_wakeups.subscribe(&mut node, it, SAMPLES, true));
         let fixes = settings.fixes.as_ref();
         let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
             configuration_dds_name: node.dds_name(&topic)?,
-            configurations: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
-            older: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
+            configurations: wakeups.subscribe(&mut node, &topic, TURNS, false)?,
+            older: wakeups.subscribe(&mut node, &topic, TURNS, false)?,
             azimuths: None,
             gyro: gyro.transpose()?,
             wheels: wheels.transpose()?,
@@ -185,18 +185,6 @@ impl Driver {
     }
 }
 
-fn subscribe<M: Ros2Message + Send + 'static>(
-    node: &mut Node,
-    wakeups: &mut Wakeups,
-    topic: &str,
-    depth: usize,
-    is_lossy: bool,
-) -> Result<Subscription<M>, StageError> {
-    let mut subscription = node.subscribe(topic, depth, is_lossy)?;
-    wakeups.add(&mut subscription)?;
-    Ok(subscription)
-}
-
 fn packets<M: Ros2Message + Send + 'static>(
     node: &mut Node,
     wakeups: &mut Wakeups,
@@ -204,7 +192,7 @@ fn packets<M: Ros2Message + Send + 'static>(
     depth: usize,
     of: fn(M) -> PacketMessage,
 ) -> Result<TakePacket, StageError> {
-    let topic: Subscription<M> = subscribe(node, wakeups, topic, depth, false)?;
+    let topic: Subscription<M> = wakeups.subscribe(node, topic, depth, false)?;
     let take = move || -> Result<Option<Packet>, ReadError> {
         let taken = topic.take()?;
         Ok(taken.map(|(message, info)| Packet {

@@ -42,10 +42,8 @@ impl Fixes {
             ))
         };
         let (socket, listen) = socket_to(&settings.listen).map_err(failed)?;
-        let mut topic = node.subscribe(&settings.topic, FIXES, true)?;
-        wakeups.add(&mut topic)?;
         Ok(Self {
-            topic,
+            topic: wakeups.subscribe(node, &settings.topic, FIXES, true)?,
             socket,
             listen,
             has_failed: false,

@@ -6,11 +6,14 @@ use std::{
     time::Duration,
 };
 
+use gyre_ros2_messages::Ros2Message;
 use gyre_stage::StageError;
 use ros2_client::{
     Subscription,
-    dds::rustdds::mio1::{Events, Interest, Poll, Token, event::Source},
+    dds::rustdds::mio1::{Events, Interest, Poll, Token},
 };
+
+use crate::node::Node;
 
 /// Events that are taken at once: one for each topic.
 const CAPACITY: usize = 4;
@@ -28,16 +31,20 @@ impl Wakeups {
         })
     }
 
-    pub fn add<M>(&mut self, topic: &mut Subscription<M>) -> Result<(), StageError>
-    where
-        Subscription<M>: Source,
-    {
+    /// Subscribes to a topic as [`Node::subscribe`]; its messages make the descriptor readable.
+    pub fn subscribe<M: Ros2Message + Send + 'static>(
+        &mut self,
+        node: &mut Node,
+        topic: &str,
+        depth: usize,
+        is_lossy: bool,
+    ) -> Result<Subscription<M>, StageError> {
+        let mut topic: Subscription<M> = node.subscribe(topic, depth, is_lossy)?;
         // All topics are read after an event of one.
-        let registered = self
-            .poll
-            .registry()
-            .register(topic, Token(0), Interest::READABLE);
-        registered.map_err(failed)
+        let registry = self.poll.registry();
+        let registered = registry.register(&mut topic, Token(0), Interest::READABLE);
+        registered.map_err(failed)?;
+        Ok(topic)
     }
 
     pub fn descriptor(&self) -> BorrowedFd<'_> {
