@@ -95,7 +95,7 @@ impl Driver {
         let wheels = settings.wheels_topic.as_deref();
         let wheels = wheels.map(|it| sample_wakeups.subscribe(&mut node, it, SAMPLES, true));
         let fixes = settings.fixes.as_ref();
-        let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
+        let fixes = fixes.map(|config| Fixes::open(&mut node, &mut wakeups, config));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
