@@ -25,15 +25,14 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
         out: absolute(&run)?,
         domain,
         namespace: arguments.namespace.clone(),
-        frames: arguments.frames.frames.clone(),
-        mounting: arguments.frames.mounting.parse()?,
+        vehicle: arguments.frames.vehicle()?,
         transforms: !arguments.no_tf,
         map: (!arguments.no_map).then_some(map_settings),
     })?;
     let out = run.display();
     print::note(format_args!(
         "gyre: {out} is published in domain {} of ROS 2",
-        domain.id()
+        domain.id
     ));
     if domain.is_open() {
         print::note(
@@ -67,7 +66,6 @@ pub fn receive(
     source: &SourceConfig,
     options: &DatasetOptions,
 ) -> Result<StageCounters, StageError> {
-    let settings = source::Settings::of(source, options);
-    let settings = settings.map_err(|error| StageError::Input(error.to_string()))?;
+    let settings = source::Settings::of(source, options).map_err(StageError::Input)?;
     source::run(launch, settings)
 }

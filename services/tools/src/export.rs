@@ -8,15 +8,9 @@ mod source;
 
 use std::{path::Path, process::ExitCode};
 
-use gyre_messages::ListedObject;
 use gyre_recording::bags::{BagWriter, Kept, Topic};
 use gyre_ros2_messages::{
-    Mounting,
-    frames::{self, Frames, Interval},
-    nav_msgs::Odometry,
-    objects,
-    tf2_msgs::TFMessage,
-    vision_msgs::Detection3DArray,
+    Vehicle, nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
     visualization_msgs::MarkerArray,
 };
 use gyre_terminal::{Failure, print};
@@ -37,12 +31,12 @@ pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
 
 fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> Result<(), Failure> {
     let mut bag = BagWriter::create(path)?;
-    let frames = arguments.frames.frames.clone();
-    let mounting = arguments.frames.mounting.parse()?;
+    let vehicle = &arguments.frames.vehicle()?;
     let mut places = source.places()?.peekable();
-    let begin = |_: &_| Trajectory::begin(&mut bag, &frames, mounting);
+    let begin = |_: &_| Trajectory::begin(&mut bag, vehicle);
     let mut trajectory = places.peek().map(begin).transpose()?;
-    let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, &frames.radar)?;
+    let frame = &vehicle.frames.radar;
+    let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, frame)?;
     let mut last_ns = 0;
     loop {
         let scan_ns = match &mut scans {
@@ -51,12 +45,12 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
         };
         // After the last scan all the rest is due; what cannot be read is due at once.
         let is_due = |place: &Result<Place, Failure>| match (place, scan_ns) {
-            (Ok(place), Some(scan_ns)) => place.stamp_ns <= scan_ns,
+            (Ok(place), Some(scan_ns)) => place.stamp_ns() <= scan_ns,
             _ => true,
         };
         while let Some(place) = places.next_if(is_due) {
             let place = place?;
-            last_ns = last_ns.max(place.stamp_ns);
+            last_ns = last_ns.max(place.stamp_ns());
             if let Some(trajectory) = &mut trajectory {
                 trajectory.write(&mut bag, &place)?;
             }
@@ -66,7 +60,7 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
             None => break,
         }
     }
-    source.write_map(&mut bag, &frames, last_ns, &mounting)?;
+    source.write_map(&mut bag, last_ns, vehicle)?;
     let counts = bag
         .counts()
         .map(|(topic, count)| format!("{topic} {count}"));
@@ -81,73 +75,40 @@ fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> R
     Ok(())
 }
 
-struct Trajectory {
-    frames: Frames,
-    mounting: Mounting,
+struct Trajectory<'a> {
+    vehicle: &'a Vehicle,
     odometry: Topic<Odometry>,
     transforms: Topic<TFMessage>,
-    fixed: Topic<TFMessage>,
+    /// The topic of the mounting, until the first pose.
+    fixed: Option<Topic<TFMessage>>,
     /// Of a run that tracks objects, from the first scan that has them.
     objects: Option<(Topic<Detection3DArray>, Topic<MarkerArray>)>,
-    /// True if the mounting has been written.
-    is_mounted: bool,
 }
 
-impl Trajectory {
-    fn begin(bag: &mut BagWriter, frames: &Frames, mounting: Mounting) -> Result<Self, Failure> {
+impl<'a> Trajectory<'a> {
+    fn begin(bag: &mut BagWriter, vehicle: &'a Vehicle) -> Result<Self, Failure> {
         Ok(Self {
-            frames: frames.clone(),
-            mounting,
+            vehicle,
             odometry: bag.topic("/odom", Kept::ForNobody)?,
             transforms: bag.topic("/tf", Kept::ForNobody)?,
-            fixed: bag.topic("/tf_static", Kept::ForLater)?,
+            fixed: Some(bag.topic("/tf_static", Kept::ForLater)?),
             objects: None,
-            is_mounted: false,
         })
     }
 
     fn write(&mut self, bag: &mut BagWriter, place: &Place) -> Result<(), Failure> {
-        let (frames, stamp_ns) = (&self.frames, place.stamp_ns);
-        if !self.is_mounted {
-            let radar = self.mounting.radar();
-            let mounted = frames::transform(stamp_ns, &frames.base, &frames.radar, radar);
-            let message = TFMessage {
-                transforms: vec![mounted],
-            };
-            bag.write(&self.fixed, stamp_ns, &message)?;
-            self.is_mounted = true;
+        let (vehicle, stamp_ns) = (self.vehicle, place.stamp_ns());
+        if let Some(fixed) = self.fixed.take() {
+            bag.write(&fixed, stamp_ns, &vehicle.mounted(stamp_ns))?;
         }
-        let pose = self.mounting.of_vehicle_uncertain(&place.pose);
-        let since = place.since.map(|since| Interval {
-            motion: self.mounting.of_vehicle_uncertain(&since.motion),
-            ..since
-        });
-        let odometry = frames::odometry(stamp_ns, frames, &pose, since.as_ref());
-        let mut transforms = vec![frames::transform(
-            stamp_ns,
-            &frames.odom,
-            &frames.base,
-            &pose.motion,
-        )];
-        transforms.extend(place.map_from_odometry.map(|correction| {
-            let correction = self.mounting.of_vehicle(&correction);
-            frames::transform(stamp_ns, &frames.map, &frames.odom, &correction)
-        }));
+        let corrected = place.map_from_odometry.as_ref();
+        let transforms = vehicle.transforms(stamp_ns, &place.pose, corrected);
+        let odometry = vehicle.odometry(stamp_ns, &place.pose);
         bag.write(&self.odometry, stamp_ns, &odometry)?;
-        bag.write(&self.transforms, stamp_ns, &TFMessage { transforms })?;
-        match &place.objects {
-            Some(objects) => self.write_objects(bag, stamp_ns, objects),
-            None => Ok(()),
-        }
-    }
-
-    fn write_objects(
-        &mut self,
-        bag: &mut BagWriter,
-        stamp_ns: i64,
-        listed: &[ListedObject],
-    ) -> Result<(), Failure> {
-        let (frames, mounting) = (&self.frames, &self.mounting);
+        bag.write(&self.transforms, stamp_ns, &transforms)?;
+        let Some(listed) = &place.objects else {
+            return Ok(());
+        };
         let (detections, markers) = match &mut self.objects {
             Some(topics) => topics,
             topics => topics.insert((
@@ -155,9 +116,9 @@ impl Trajectory {
                 bag.topic("/object_markers", Kept::ForNobody)?,
             )),
         };
-        let detected = objects::detections(stamp_ns, frames, mounting, listed);
+        let detected = objects::detections(stamp_ns, vehicle, listed);
         bag.write(detections, stamp_ns, &detected)?;
-        let drawn = objects::markers(stamp_ns, frames, mounting, listed);
+        let drawn = objects::markers(stamp_ns, vehicle, listed);
         bag.write(markers, stamp_ns, &drawn)?;
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use gyre_ros2_messages::{diagnostic_msgs::DiagnosticArray, frames, tf2_msgs::TFMessage};
+use gyre_ros2_messages::{diagnostic_msgs::DiagnosticArray, tf2_msgs::TFMessage};
 use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
@@ -55,7 +55,7 @@ impl Bridge {
             },
             mounting: node.publish("/tf_static", Keep::Latched)?,
             diagnostics: node.publish("/diagnostics", Keep::Last(DEPTH))?,
-            shared: Shared::new(settings.out, settings.frames, settings.mounting),
+            shared: Shared::new(settings.out, settings.vehicle),
             _node: node,
         })
     }
@@ -63,13 +63,8 @@ impl Bridge {
     /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
     pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), StageError> {
         let shared = &self.shared;
-        let (frames, radar) = (&shared.frames, shared.mounting.radar());
-        let now_ns = clock::since_1970_ns();
-        // The place of the radar on the vehicle.
-        let place = frames::transform(now_ns, &frames.base, &frames.radar, radar);
-        self.mounting.send(TFMessage {
-            transforms: vec![place],
-        });
+        let mounted = shared.vehicle.mounted(clock::since_1970_ns());
+        self.mounting.send(mounted);
         thread::scope(|threads| {
             threads.spawn(|| follow_runs(shared, self.topics, say));
             threads.spawn(|| report(shared, self.diagnostics));

@@ -2,13 +2,9 @@
 
 use std::thread;
 
-use gyre_messages::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader, outcome};
+use gyre_messages::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader};
 use gyre_ros2_messages::{
-    frames::{self, Interval},
-    nav_msgs::Odometry,
-    objects,
-    tf2_msgs::TFMessage,
-    vision_msgs::Detection3DArray,
+    nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
     visualization_msgs::MarkerArray,
 };
 use gyre_stage::{
@@ -176,43 +172,17 @@ impl PoseTopics {
             if !state.poses.count(pose.item.seq) {
                 return;
             }
-            let stamp_ns = stamp_ns(&mut state, pose.item.stamp_ns, say);
+            let stamp_ns = state.stamp_ns(pose.item.stamp_ns, say);
             (stamp_ns, state.map_from_odometry)
         };
-        let (frames, mounting) = (&shared.frames, &shared.mounting);
-        let vehicle = mounting.of_vehicle_uncertain(&pose.pose());
-        let since = Interval {
-            motion: mounting.of_vehicle_uncertain(&pose.motion.motion().alone()),
-            duration_ns: pose.motion.interval_ns,
-            is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
-        };
-        let mut unsent = 0;
-        if let Some(transforms) = &mut self.transforms {
-            let base = frames::transform(stamp_ns, &frames.odom, &frames.base, &vehicle.motion);
-            let corrected = map_from_odometry.map(|correction| {
-                let corrected = mounting.of_vehicle(&correction);
-                frames::transform(stamp_ns, &frames.map, &frames.odom, &corrected)
-            });
-            let is_sent = transforms.send(TFMessage {
-                transforms: corrected.into_iter().chain([base]).collect(),
-            });
-            unsent += u64::from(!is_sent);
+        let (vehicle, mut unsent) = (&shared.vehicle, 0);
+        if let Some(topic) = &mut self.transforms {
+            let transforms = vehicle.transforms(stamp_ns, pose, map_from_odometry.as_ref());
+            unsent += u64::from(!topic.send(transforms));
         }
-        let odometry = frames::odometry(stamp_ns, frames, &vehicle, Some(&since));
-        unsent += u64::from(!self.odometry.send(odometry));
+        unsent += u64::from(!self.odometry.send(vehicle.odometry(stamp_ns, pose)));
         shared.state().unsent += unsent;
     }
-}
-
-/// Returns a time of the run as a time of ROS, and reports the first difference between the two.
-fn stamp_ns(state: &mut RunState, time_ns: i64, say: fn(&str)) -> i64 {
-    let (stamp_ns, is_first) = state.stamp_ns(time_ns);
-    if is_first && stamp_ns != time_ns {
-        say(
-            "the times of this run do not count from 1970: its stamps in ROS begin with this computer's time at the first pose",
-        );
-    }
-    stamp_ns
 }
 
 impl ObjectTopics {
@@ -224,11 +194,11 @@ impl ObjectTopics {
             if !state.objects.count(header.item.seq) {
                 return;
             }
-            stamp_ns(&mut state, header.item.stamp_ns, say)
+            state.stamp_ns(header.item.stamp_ns, say)
         };
-        let (frames, mounting, listed) = (&shared.frames, &shared.mounting, header.list());
-        let detections = objects::detections(stamp_ns, frames, mounting, listed);
-        let markers = objects::markers(stamp_ns, frames, mounting, listed);
+        let (vehicle, listed) = (&shared.vehicle, header.list());
+        let detections = objects::detections(stamp_ns, vehicle, listed);
+        let markers = objects::markers(stamp_ns, vehicle, listed);
         let sent = [self.detections.send(detections), self.markers.send(markers)];
         shared.state().unsent += sent.map(|is_sent| u64::from(!is_sent)).iter().sum::<u64>();
     }

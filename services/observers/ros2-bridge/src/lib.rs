@@ -15,5 +15,4 @@ mod settings;
 pub mod source;
 
 pub use bridge::Bridge;
-pub use gyre_ros2_messages::{Mounting, frames::Frames};
 pub use settings::{MapSettings, MapSettingsOf, Settings};

@@ -61,7 +61,7 @@ fn publish(
     settings: &MapSettings,
     maps: &mut Outlet<OccupancyGrid>,
 ) -> Result<(), LiveMapError> {
-    let mut map = LiveMap::open(&shared.out, settings, *shared.mounting.radar())?;
+    let mut map = LiveMap::open(&shared.out, settings, *shared.vehicle.mounting.radar())?;
     let mut due = Instant::now();
     // A last time when the logs are complete.
     let mut ended = false;
@@ -76,7 +76,7 @@ fn publish(
             let grid = grid(&mut map.evidence)?;
             let is_sent = maps.send(occupancy_grid(
                 clock::since_1970_ns(),
-                &shared.frames.map,
+                &shared.vehicle.frames.map,
                 grid.cell_m,
                 [grid.columns, grid.rows],
                 grid.corner_m,

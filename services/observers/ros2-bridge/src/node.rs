@@ -50,7 +50,7 @@ impl Node {
             .map_err(|reason| name_error(&format!("{namespace} {name}"), &reason))?;
         let joined = join(domain, node_name);
         joined.map_err(|reason| {
-            let domain = domain.id();
+            let domain = domain.id;
             StageError::Input(format!("cannot join domain {domain} of ROS 2: {reason}"))
         })
     }
@@ -122,8 +122,8 @@ impl Node {
 }
 
 fn join(domain: &Domain, name: NodeName) -> Result<Node, Box<dyn Error>> {
-    let mut builder = DomainParticipantBuilder::new(domain.id());
-    if let Some(address) = domain.interface() {
+    let mut builder = DomainParticipantBuilder::new(domain.id);
+    if let Some(address) = domain.interface {
         builder = builder.with_only_networks([IpAddr::V4(address)]);
     }
     let context = Context::from_domain_participant(builder.build()?)?;

@@ -10,18 +10,17 @@ use std::{
 };
 
 use gyre_geometry::Pose;
-use gyre_ros2_messages::frames::Frames;
+use gyre_ros2_messages::Vehicle;
 use gyre_stage::clock;
 
-use crate::{Mounting, clock::offset_ns};
+use crate::clock::offset_ns;
 
 /// The longest wait between two looks at the run.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub struct Shared {
     pub out: PathBuf,
-    pub frames: Frames,
-    pub mounting: Mounting,
+    pub vehicle: Vehicle,
     stopping: AtomicBool,
     state: Mutex<RunState>,
 }
@@ -68,15 +67,19 @@ impl Counts {
 }
 
 impl RunState {
-    /// Returns a time of the run as a time of ROS, and whether it is the first one: by that the
-    /// clock is set.
-    pub fn stamp_ns(&mut self, time_ns: i64) -> (i64, bool) {
-        let is_first = self.offset_ns.is_none();
-        let now_ns = clock::since_1970_ns();
-        let offset_ns = self
-            .offset_ns
-            .get_or_insert_with(|| offset_ns(time_ns, now_ns));
-        (time_ns.saturating_add(*offset_ns), is_first)
+    /// Returns a time of the run as a time of ROS. The first one sets the clock; a difference
+    /// between the two is reported.
+    pub fn stamp_ns(&mut self, time_ns: i64, say: fn(&str)) -> i64 {
+        let offset_ns = *self.offset_ns.get_or_insert_with(|| {
+            let offset_ns = offset_ns(time_ns, clock::since_1970_ns());
+            if offset_ns != 0 {
+                say(
+                    "the times of this run do not count from 1970: its stamps in ROS begin with this computer's time at the first pose",
+                );
+            }
+            offset_ns
+        });
+        time_ns.saturating_add(offset_ns)
     }
 
     /// Returns the number of messages that were not published or not sent.
@@ -95,11 +98,10 @@ pub enum RunPhase {
 }
 
 impl Shared {
-    pub fn new(out: PathBuf, frames: Frames, mounting: Mounting) -> Self {
+    pub fn new(out: PathBuf, vehicle: Vehicle) -> Self {
         Self {
             out,
-            frames,
-            mounting,
+            vehicle,
             stopping: AtomicBool::new(false),
             state: Mutex::default(),
         }

@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use gyre_mapping::MapOptions;
-use gyre_ros2_messages::{Domain, frames::Frames};
+use gyre_ros2_messages::{Domain, Vehicle};
 use gyre_slam::EstimatorKind;
-
-use crate::Mounting;
 
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -14,8 +12,7 @@ pub struct Settings {
     pub domain: Domain,
     /// The namespace of `odom`, `map` and the objects, such as `/` or `/robot`.
     pub namespace: String,
-    pub frames: Frames,
-    pub mounting: Mounting,
+    pub vehicle: Vehicle,
     /// True to publish `odom` -> `base_link` and `map` -> `odom`: only one program may.
     pub transforms: bool,
     /// The settings of the map of a run with SLAM; `None`: no map.

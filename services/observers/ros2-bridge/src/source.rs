@@ -11,22 +11,19 @@ mod wakeups;
 use std::time::Duration;
 
 use gyre_datasets::DatasetOptions;
-use gyre_ros2_messages::{Domain, DomainError};
+use gyre_ros2_messages::Domain;
 use gyre_run::SourceConfig;
 use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
 
 pub use ask::ask;
-pub use fixes::FixSettings;
 pub use gyre_stages::live_radar::Sizes;
 
 /// The topic of an inertial sensor by REP-145.
 const IMU: &str = "/imu/data";
 /// The topic of the odometry of wheels, as drivers of bases name it.
 const ODOMETRY: &str = "/odom";
-/// The topic of a GNSS receiver, as `nmea_navsat_driver` names it.
-const FIX: &str = "/fix";
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -35,7 +32,8 @@ pub struct Settings {
     pub topic: String,
     pub gyro_topic: Option<String>,
     pub wheels_topic: Option<String>,
-    pub fixes: Option<FixSettings>,
+    /// The receiver of GNSS, if it is in ROS 2.
+    pub fixes: Option<GnssConfig>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -48,7 +46,7 @@ pub struct Settings {
 impl Settings {
     /// Returns the settings of the section `[source]`, with the constants of the section
     /// `[dataset]`.
-    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, DomainError> {
+    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, String> {
         let interface = Some(source.interface.as_str()).filter(|address| !address.is_empty());
         Ok(Self {
             domain: Domain::new(source.domain, interface)?,
@@ -79,10 +77,7 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Sta
     let topic = wheels.topic.unwrap_or_else(|| ODOMETRY.to_owned());
     settings.wheels_topic = (wheels.kind == WheelsKind::Ros2).then_some(topic);
     let gnss: GnssConfig = launch.section("gnss")?;
-    settings.fixes = (gnss.kind == GnssKind::Ros2).then(|| FixSettings {
-        topic: gnss.topic.unwrap_or_else(|| FIX.to_owned()),
-        listen: gnss.listen,
-    });
+    settings.fixes = (gnss.kind == GnssKind::Ros2).then_some(gnss);
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::open(settings)?, scans)
 }

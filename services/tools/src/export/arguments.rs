@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use gyre_ros2_messages::frames::Frames;
+use gyre_ros2_messages::{Vehicle, frames::Frames};
 
 #[derive(Debug, Args)]
 pub struct ExportArguments {
@@ -44,6 +44,15 @@ pub struct FrameArguments {
         allow_hyphen_values = true
     )]
     pub mounting: String,
+}
+
+impl FrameArguments {
+    pub fn vehicle(&self) -> Result<Vehicle, String> {
+        Ok(Vehicle {
+            frames: self.frames.clone(),
+            mounting: self.mounting.parse()?,
+        })
+    }
 }
 
 /// The form of the scans in the bag.

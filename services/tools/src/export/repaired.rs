@@ -8,11 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_configuration::Configuration;
-use gyre_datasets::{
-    Dataset, DatasetOptions, Format, LostAzimuthOption, ReadError, find_ground_truth,
-    stored_options,
-};
+use gyre_datasets::{DatasetOptions, Format, LostAzimuthOption, find_ground_truth, stored_options};
 use gyre_radar::{
     LostAzimuths, OwnedScan,
     lost::{repair, stale_rows},
@@ -21,7 +17,7 @@ use gyre_storage::{StorageError, create_folder, write as write_file};
 use gyre_terminal::{Failure, print};
 
 use crate::{
-    export::source::{Lost, Source},
+    export::source::{Lost, Scans, Source},
     masks::picture::write_grey,
 };
 
@@ -32,21 +28,16 @@ const OPTIONS: &str = "dataset.toml";
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
 pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
-    let Some(configuration) = source.configuration() else {
-        return Err(
-            "where azimuths were lost is known from a run: name the folder of its results".into(),
-        );
-    };
-    let dataset = recording(configuration)?;
-    let played = configuration.source.played(dataset.scans());
-    let images = dataset
-        .file(played.start)
+    let recording = recording(source)?;
+    let images = recording
+        .dataset
+        .file(recording.played.start)
         .parent()
         .unwrap_or(Path::new(""))
         .to_owned();
     let mut writer = Writer {
-        scan: OwnedScan::with_limits(dataset.limits()),
-        dataset,
+        scan: OwnedScan::with_limits(recording.dataset.limits()),
+        recording,
         found: source.lost()?,
         out: new_folder(out)?,
         scans: 0,
@@ -54,7 +45,7 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
         azimuths: 0,
         anywhere: 0,
     };
-    for index in played {
+    while let Some(index) = writer.recording.next(&mut writer.scan, &mut 0)? {
         writer.write(index)?;
     }
     let root = images.parent().unwrap_or(Path::new(""));
@@ -77,20 +68,27 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     ))
 }
 
-fn recording(configuration: &Configuration) -> Result<Box<dyn Dataset>, Failure> {
+fn recording(source: &Source) -> Result<Scans, Failure> {
+    let Some(configuration) = &source.run else {
+        return Err(
+            "where azimuths were lost is known from a run: name the folder of its results".into(),
+        );
+    };
     let data = configuration.data();
     if configuration.streamed().is_some() {
         return Err(format!("the run was of {data}, which is not on disk: gyre simulate writes it, without lost azimuths if effects.lost_azimuths is false").into());
     }
-    let dataset = gyre_configuration::open(configuration)?.dataset;
-    let format = dataset.format();
+    let Some(scans) = source.scans()? else {
+        return Err("the run was of a radar, and has no scans: --record keeps them".into());
+    };
+    let format = scans.dataset.format();
     if format != Format::Radiate {
         return Err(format!("the scans of {data} are of the format `{format}`, and --format radiate repairs only those that are of RADIATE's").into());
     }
     if configuration.dataset.lost_azimuths == Some(LostAzimuthOption::Ignore) {
         return Err("the run has not looked for lost azimuths: run it again without dataset.lost_azimuths = \"ignore\"".into());
     }
-    Ok(dataset)
+    Ok(scans)
 }
 
 /// Creates the folder of a dataset and of its images, and returns the folder of the images.
@@ -107,7 +105,7 @@ fn new_folder(out: &Path) -> Result<PathBuf, Failure> {
 }
 
 struct Writer {
-    dataset: Box<dyn Dataset>,
+    recording: Scans,
     scan: OwnedScan,
     found: Lost,
     out: PathBuf,
@@ -120,15 +118,7 @@ struct Writer {
 
 impl Writer {
     fn write(&mut self, index: usize) -> Result<(), Failure> {
-        match self.dataset.read(index, self.scan.slot()) {
-            Ok(geometry) => self.scan.geometry = geometry,
-            Err(error @ ReadError::Io { .. }) => return Err(error.into()),
-            Err(error) => {
-                print::note(format_args!("scan {index} is left out: {error}"));
-                return Ok(());
-            }
-        }
-        let from = self.dataset.file(index);
+        let from = self.recording.dataset.file(index);
         let to = self.out.join(from.file_name().unwrap_or_default());
         let lost = stale_rows(&self.scan.view());
         self.scans += 1;
@@ -158,11 +148,11 @@ impl Writer {
         let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
         let mut powers = vec![0; azimuths * bins];
         repair(&scan, places, &mut powers);
-        if self.dataset.is_transposed() {
+        if self.recording.dataset.is_transposed() {
             let by_range = (0..bins).flat_map(|bin| powers.iter().skip(bin).step_by(bins));
             powers = by_range.copied().collect();
         }
-        write_grey(to, self.dataset.image_size().width, &powers)
+        write_grey(to, self.recording.dataset.image_size().width, &powers)
     }
 }
 

@@ -33,10 +33,10 @@ pub struct ScanWriter {
     lost: Lost,
     rows: PlacedRows,
     messages: ScanMessages,
-    configuration: Topic<RadarConfigurationMsg>,
+    /// Its topic, until the first scan.
+    configuration: Option<Topic<RadarConfigurationMsg>>,
     azimuths: Option<Topic<RadarFftDataMsg>>,
     b_scans: Option<Topic<RadarBScanMsg>>,
-    is_described: bool,
 }
 
 #[derive(Debug, Default)]
@@ -153,7 +153,7 @@ impl ScanWriter {
         };
         let mut losses = Losses::default();
         let mut scan = OwnedScan::with_limits(scans.dataset.limits());
-        let Some(first) = scans.next(&mut scan, &mut losses)? else {
+        let Some(first) = scans.next(&mut scan, &mut losses.unreadable)? else {
             return Ok(None);
         };
         let radar = losses.radar(&scans, &scan)?;
@@ -167,7 +167,7 @@ impl ScanWriter {
         Ok(Some(Self {
             losses,
             messages: ScanMessages::new(radar, frame),
-            configuration,
+            configuration: Some(configuration),
             azimuths,
             b_scans: b_scans.transpose()?,
             lost: source.lost()?,
@@ -175,14 +175,15 @@ impl ScanWriter {
             scan,
             first: Some(first),
             scans,
-            is_described: false,
         }))
     }
 
     /// Writes the next scan that can be read, and returns its time; `None` at the end.
     pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
         let next = match self.first.take() {
-            None => self.scans.next(&mut self.scan, &mut self.losses)?,
+            None => self
+                .scans
+                .next(&mut self.scan, &mut self.losses.unreadable)?,
             first => first,
         };
         next.map(|index| self.write(index, bag)).transpose()
@@ -206,10 +207,9 @@ impl ScanWriter {
         let (Some(first_ns), Some(last_ns)) = (stamps.first(), stamps.last()) else {
             return Ok(scan.geometry.stamp_ns);
         };
-        if !self.is_described {
+        if let Some(topic) = self.configuration.take() {
             let message = self.messages.configuration(*first_ns);
-            bag.write(&self.configuration, *first_ns, &message)?;
-            self.is_described = true;
+            bag.write(&topic, *first_ns, &message)?;
         }
         if let Some(topic) = &self.azimuths {
             for message in self.messages.azimuths(scan) {
@@ -224,11 +224,12 @@ impl ScanWriter {
 }
 
 impl Scans {
-    /// Reads the next scan that can be read, and returns its number; `None` at the end.
-    fn next(
+    /// Reads the next scan that can be read, counts those before it, and returns its number; `None`
+    /// at the end.
+    pub fn next(
         &mut self,
         scan: &mut OwnedScan,
-        losses: &mut Losses,
+        unreadable: &mut u64,
     ) -> Result<Option<usize>, Failure> {
         while let Some(index) = self.played.next() {
             match self.read(index, scan) {
@@ -236,7 +237,7 @@ impl Scans {
                 Err(error @ ReadError::Io { .. }) => return Err(error.into()),
                 Err(error) => {
                     print::note(format_args!("scan {index} is left out: {error}"));
-                    losses.unreadable += 1;
+                    *unreadable += 1;
                 }
             }
         }

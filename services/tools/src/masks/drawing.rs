@@ -4,13 +4,12 @@
 
 use std::path::Path;
 
+use gyre_mapping::encode_png;
 use gyre_terminal::Failure;
 use ndarray::Array2;
+use png::ColorType;
 
-use crate::masks::{
-    inspection::{Inspection, MaskedRaster},
-    picture::write_rgb,
-};
+use crate::masks::inspection::{Inspection, MaskedRaster};
 
 type Colour = [u8; 3];
 
@@ -63,7 +62,8 @@ impl Canvas {
     }
 
     pub fn write(&self, path: &Path) -> Result<(), Failure> {
-        write_rgb(path, self.width, &self.pixels)
+        let picture = encode_png(self.width, ColorType::Rgb, self.pixels.as_flattened())?;
+        Ok(gyre_storage::write(path, picture)?)
     }
 
     fn square(&mut self, [row, column]: [usize; 2], side: usize, colour: Colour) {

@@ -202,7 +202,7 @@ impl Player<'_> {
     fn ended(self) -> Played {
         let lost_datagrams = match &self.output {
             Output::Clients(_) => 0,
-            Output::Group { group, .. } => group.lost,
+            Output::Group(group) => group.lost,
         };
         Played {
             lost_datagrams,
@@ -256,7 +256,7 @@ impl Player<'_> {
                 write_azimuth(&mut self.message, &azimuth);
                 clients.send(&self.message);
             }
-            Output::Group { group, .. } => group.send(&self.radar, &azimuth),
+            Output::Group(group) => group.send(&self.radar, &azimuth),
         }
     }
 }

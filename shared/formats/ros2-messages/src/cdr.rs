@@ -3,49 +3,42 @@
 use std::fmt::Display;
 
 use byteorder::{BigEndian, LittleEndian};
-use thiserror::Error;
 
 use crate::Ros2Message;
 
 /// Plain CDR, little-endian, without options.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// Bytes that are not a message of a type: a sentence.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{0}")]
-pub struct BadMessage(String);
+/// Returns the sentence on bytes that are not a message of a type.
+pub(crate) fn bad<T: Ros2Message>(reason: impl Display) -> String {
+    format!("{}: {reason}", T::DEFINITION.type_name())
+}
 
-impl BadMessage {
-    pub(crate) fn of<T: Ros2Message>(reason: impl Display) -> Self {
-        Self(format!("{}: {reason}", T::DEFINITION.type_name()))
-    }
-
-    fn content<T: Ros2Message>(bytes: usize, error: &cdr_encoding::Error) -> Self {
-        Self::of::<T>(format_args!("{error} in a message of {bytes} bytes"))
-    }
+fn bad_content<T: Ros2Message>(bytes: usize, error: &cdr_encoding::Error) -> String {
+    bad::<T>(format_args!("{error} in a message of {bytes} bytes"))
 }
 
 /// Returns a message as little-endian CDR, as `rosbag2` stores it and DDS sends it.
-pub fn encode<T: Ros2Message>(message: &T) -> Result<Vec<u8>, BadMessage> {
+pub fn encode<T: Ros2Message>(message: &T) -> Result<Vec<u8>, String> {
     let mut bytes = LITTLE_ENDIAN.to_vec();
     cdr_encoding::to_writer::<_, LittleEndian, _>(&mut bytes, message)
-        .map_err(|error| BadMessage::content::<T>(0, &error))?;
+        .map_err(|error| bad_content::<T>(0, &error))?;
     Ok(bytes)
 }
 
 /// Returns the message in these bytes. What follows it is padding. It allocates no more than the
 /// bytes hold, whatever lengths they give.
-pub fn decode<T: Ros2Message>(bytes: &[u8]) -> Result<T, BadMessage> {
+pub fn decode<T: Ros2Message>(bytes: &[u8]) -> Result<T, String> {
     let (head, content) = bytes.split_at(bytes.len().min(LITTLE_ENDIAN.len()));
     let decoded = match head {
         [0, 0, _, _] => cdr_encoding::from_bytes::<T, BigEndian>(content),
         [0, 1, _, _] => cdr_encoding::from_bytes::<T, LittleEndian>(content),
         _ => {
-            return Err(BadMessage::of::<T>(format_args!(
+            return Err(bad::<T>(format_args!(
                 "{head:02x?} does not begin a message in CDR, expected [00, 00] or [00, 01]"
             )));
         }
     };
-    let (message, _) = decoded.map_err(|error| BadMessage::content::<T>(bytes.len(), &error))?;
+    let (message, _) = decoded.map_err(|error| bad_content::<T>(bytes.len(), &error))?;
     Ok(message)
 }

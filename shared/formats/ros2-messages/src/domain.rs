@@ -2,8 +2,6 @@
 
 use std::{env, net::Ipv4Addr};
 
-use thiserror::Error;
-
 /// The variable of ROS 2 that names the domain.
 const DOMAIN: &str = "ROS_DOMAIN_ID";
 /// The variables of ROS 2 that keep it on this computer, and the value of each that does.
@@ -17,22 +15,17 @@ const MAX_DOMAIN: u16 = 232;
 /// A domain of ROS 2, and the network on which it is joined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Domain {
-    id: u16,
+    pub id: u16,
     /// Address of this machine on the only network that is used; `None`: all networks.
-    interface: Option<Ipv4Addr>,
+    pub interface: Option<Ipv4Addr>,
 }
-
-/// A domain that cannot be joined: a sentence.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{0}")]
-pub struct DomainError(String);
 
 impl Domain {
     /// Returns the domain of this number, or of the variable `ROS_DOMAIN_ID`, or 0; on the network
     /// on which this machine has this address, or on all. Where ROS 2 is restricted to this
     /// computer (`ROS_LOCALHOST_ONLY=1`, `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`), no address
     /// means the loopback.
-    pub fn new(id: Option<u16>, interface: Option<&str>) -> Result<Self, DomainError> {
+    pub fn new(id: Option<u16>, interface: Option<&str>) -> Result<Self, String> {
         let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
         Self::of(id, interface, &variable)
     }
@@ -41,27 +34,25 @@ impl Domain {
         id: Option<u16>,
         interface: Option<&str>,
         variable: &dyn Fn(&str) -> Option<String>,
-    ) -> Result<Self, DomainError> {
+    ) -> Result<Self, String> {
         let range = format!("from 0 to {MAX_DOMAIN}");
         let id = match (id, variable(DOMAIN)) {
             (Some(id), _) => id,
             (None, None) => 0,
-            (None, Some(text)) => text.parse().map_err(|_| {
-                DomainError(format!(
-                    "{DOMAIN} is `{text}`, but must be a number {range}"
-                ))
-            })?,
+            (None, Some(text)) => text
+                .parse()
+                .map_err(|_| format!("{DOMAIN} is `{text}`, but must be a number {range}"))?,
         };
         if id > MAX_DOMAIN {
             let reason = format!("domains of ROS 2 are numbers {range}");
-            return Err(DomainError(format!("domain {id} does not exist: {reason}")));
+            return Err(format!("domain {id} does not exist: {reason}"));
         }
         let stays = |(name, value): &(&str, &str)| variable(name).as_deref() == Some(*value);
         let interface = match interface {
             Some(text) => Some(text.parse().map_err(|_| {
-                DomainError(format!(
+                format!(
                     "interface `{text}` is no IPv4 address: give this machine's, as in `192.168.0.2`, or `127.0.0.1` for this computer alone"
-                ))
+                )
             })?),
             None => {
                 let is_restricted = ON_THIS_COMPUTER.iter().any(stays);
@@ -71,17 +62,9 @@ impl Domain {
         Ok(Self { id, interface })
     }
 
-    pub fn id(&self) -> u16 {
-        self.id
-    }
-
     /// Returns whether other machines can take part.
     pub fn is_open(&self) -> bool {
         self.interface.is_none_or(|address| !address.is_loopback())
-    }
-
-    pub fn interface(&self) -> Option<Ipv4Addr> {
-        self.interface
     }
 }
 
@@ -99,12 +82,12 @@ mod tests {
             let found = set.iter().find(|(variable, _)| *variable == name);
             found.map(|(_, value)| (*value).to_owned())
         };
-        Domain::of(id, interface, &variable).map_err(|error| error.to_string())
+        Domain::of(id, interface, &variable)
     }
 
     #[test]
     fn the_domain_is_that_of_ros_unless_it_is_given() {
-        let of = |id, set: &[_]| domain(id, None, set).map(|domain| domain.id());
+        let of = |id, set: &[_]| domain(id, None, set).map(|domain| domain.id);
         assert_eq!(of(None, &[]), Ok(0));
         assert_eq!(of(None, &[(DOMAIN, "42")]), Ok(42));
         assert_eq!(of(Some(7), &[(DOMAIN, "42")]), Ok(7));

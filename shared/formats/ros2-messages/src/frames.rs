@@ -42,7 +42,15 @@ impl FromStr for Frames {
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
         let is_name = |name: &String| !name.is_empty() && !name.starts_with('/');
         match <[String; 4]>::try_from(names) {
-            Ok(names) if names.iter().all(is_name) => Ok(Self::of(names)),
+            Ok(names) if names.iter().all(is_name) => {
+                let [map, odom, base, radar] = names;
+                Ok(Self {
+                    map,
+                    odom,
+                    base,
+                    radar,
+                })
+            }
             _ => Err(
                 "four names without `/` before them are needed, as in map,odom,base_link,radar"
                     .to_owned(),
@@ -51,25 +59,8 @@ impl FromStr for Frames {
     }
 }
 
-impl Frames {
-    fn of([map, odom, base, radar]: [String; 4]) -> Self {
-        Self {
-            map,
-            odom,
-            base,
-            radar,
-        }
-    }
-}
-
-impl Default for Frames {
-    fn default() -> Self {
-        Self::of(["map", "odom", "base_link", "radar"].map(str::to_owned))
-    }
-}
-
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
+pub(crate) struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
     /// the earlier frame.
     pub motion: UncertainMotion,
@@ -85,7 +76,7 @@ pub struct Interval {
 /// covariance that follows from the motion's. The velocity of a predicted motion has the variance
 /// [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
 /// zero, with the same variance.
-pub fn odometry(
+pub(crate) fn odometry(
     stamp_ns: i64,
     frames: &Frames,
     pose: &UncertainMotion,
@@ -159,7 +150,7 @@ fn seconds(since: &Interval) -> f64 {
 }
 
 /// Returns the pose of the frame `inner` in the frame `outer`.
-pub fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
+pub(crate) fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
     let geometry_msgs::Pose {
         position: Point { x, y, z },
         orientation: rotation,
@@ -214,6 +205,7 @@ pub fn occupancy_grid(
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
@@ -221,9 +213,10 @@ mod tests {
     #[test]
     fn frames_are_four_names() {
         let frames = Frames {
+            map: "map".to_owned(),
+            odom: "odom".to_owned(),
             base: "car/base".to_owned(),
             radar: "radar_top".to_owned(),
-            ..Frames::default()
         };
         assert_eq!("map, odom,car/base,radar_top".parse(), Ok(frames));
         for text in [
@@ -266,7 +259,8 @@ mod tests {
             is_measured: true,
         };
         let pose = uncertain(planar(2.0, 2.0, FRAC_PI_2), Matrix3::identity());
-        let odometry = odometry(7, &Frames::default(), &pose, Some(&since));
+        let frames = "map,odom,base_link,radar".parse().unwrap();
+        let odometry = odometry(7, &frames, &pose, Some(&since));
         // A quarter circle of radius 2 m to the left in half a second.
         let twist = odometry.twist.twist;
         assert!((twist.linear.x - 2.0 * FRAC_PI_2 / 0.5).abs() < 1e-9);
@@ -277,11 +271,11 @@ mod tests {
             is_measured: false,
             ..since
         };
-        let predicted = self::odometry(7, &Frames::default(), &pose, Some(&predicted));
+        let predicted = self::odometry(7, &frames, &pose, Some(&predicted));
         assert_eq!(predicted.twist.twist, odometry.twist.twist);
         assert_eq!(predicted.twist.covariance, covariance(None));
         assert_ne!(odometry.twist.covariance, covariance(None));
-        let first = self::odometry(0, &Frames::default(), &UncertainMotion::identity(), None);
+        let first = self::odometry(0, &frames, &UncertainMotion::identity(), None);
         assert_eq!(first.twist.twist, geometry_msgs::Twist::default());
         assert_eq!(first.twist.covariance, covariance(None));
     }

@@ -16,10 +16,12 @@ pub mod radar;
 pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod tf2_msgs;
+mod vehicle;
 pub mod vision_msgs;
 pub mod visualization_msgs;
 
-pub use cdr::{BadMessage, decode, encode};
+pub use cdr::{decode, encode};
 pub use definition::{Definition, Ros2Message};
-pub use domain::{Domain, DomainError};
+pub use domain::Domain;
 pub use mounting::Mounting;
+pub use vehicle::Vehicle;

@@ -13,13 +13,6 @@ pub struct Mounting(Pose);
 const NEEDED: &str =
     "three numbers are needed: m forward, m to the left, degrees counter-clockwise, as in 1.2,0,90";
 
-impl Default for Mounting {
-    /// Returns the mounting of a radar in the origin of the vehicle's frame, which looks ahead.
-    fn default() -> Self {
-        Self(Pose::identity())
-    }
-}
-
 impl FromStr for Mounting {
     type Err = String;
 

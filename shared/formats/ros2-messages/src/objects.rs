@@ -8,8 +8,7 @@ use gyre_messages::ListedObject;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::{
-    Mounting,
-    frames::{self, Frames},
+    Mounting, Vehicle, frames,
     geometry_msgs::{self, Covariance, PoseWithCovariance, Vector3},
     std_msgs::{ColorRGBA, Header},
     vision_msgs::{
@@ -34,13 +33,9 @@ const LETTER_M: f64 = 1.2;
 /// The covariance of a pose is the covariance of the centre along the axes of `odom`. The heading
 /// has none in Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`].
 /// Boxes have no height, for the same reason.
-pub fn detections(
-    stamp_ns: i64,
-    frames: &Frames,
-    mounting: &Mounting,
-    objects: &[ListedObject],
-) -> Detection3DArray {
-    let header = Header::new(stamp_ns, &frames.odom);
+pub fn detections(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> Detection3DArray {
+    let mounting = &vehicle.mounting;
+    let header = Header::new(stamp_ns, &vehicle.frames.odom);
     let detection = |object: &ListedObject| {
         let pose = frames::pose(&place(mounting, object));
         let class_id = if object.is_moving() { MOVING } else { STANDING };
@@ -69,65 +64,46 @@ pub fn detections(
 /// Returns the objects of a scan as shapes: a box of 1.6 m height, the displacement of a second as
 /// an arrow if the object moves, and the identity as a text. The shapes of the scan before are
 /// removed.
-pub fn markers(
-    stamp_ns: i64,
-    frames: &Frames,
-    mounting: &Mounting,
-    objects: &[ListedObject],
-) -> MarkerArray {
-    let header = Header::new(stamp_ns, &frames.odom);
+pub fn markers(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> MarkerArray {
+    let mounting = &vehicle.mounting;
+    let header = Header::new(stamp_ns, &vehicle.frames.odom);
     let mut markers = vec![Marker {
+        header: header.clone(),
         action: DELETEALL,
         ..Marker::default()
     }];
     for (object, id) in objects.iter().zip(0..) {
-        let moving = object.is_moving().then(|| arrow(mounting, object));
-        let shapes = [cube(mounting, object), name(mounting, object)];
-        let shapes = shapes.into_iter().chain(moving);
-        // Their action is `ADD`, the default.
-        markers.extend(shapes.map(|shape| Marker { id, ..shape }));
-    }
-    for marker in &mut markers {
-        marker.header = header.clone();
+        // The action is `ADD`, the default.
+        let shape = |ns: &str, r#type, pose, scale, opacity| Marker {
+            header: header.clone(),
+            ns: ns.to_owned(),
+            id,
+            r#type,
+            pose,
+            scale,
+            color: colour(object, opacity),
+            ..Marker::default()
+        };
+        let place = place(mounting, object);
+        let middle = lifted(&place, 0.5 * DRAWN_HEIGHT_M);
+        let sides = size(object, DRAWN_HEIGHT_M);
+        markers.push(shape("boxes", CUBE, middle, sides, 0.5));
+        let above = lifted(&place, DRAWN_HEIGHT_M + LETTER_M);
+        let letter = Vector3::new(0.0, 0.0, LETTER_M);
+        markers.push(Marker {
+            text: object.id.to_string(),
+            ..shape("identities", TEXT_VIEW_FACING, above, letter, 1.0)
+        });
+        if object.is_moving() {
+            let at = place.translation.vector;
+            let velocity = mounting.radar().rotation * Vector2::new(object.vx_mps, object.vy_mps);
+            let ahead = planar(at.x, at.y, velocity.y.atan2(velocity.x));
+            let (ahead, length) = (lifted(&ahead, DRAWN_HEIGHT_M), object.speed_mps());
+            let sides = Vector3::new(length, ARROW_M, ARROW_M);
+            markers.push(shape("velocities", ARROW, ahead, sides, 1.0));
+        }
     }
     MarkerArray { markers }
-}
-
-fn cube(mounting: &Mounting, object: &ListedObject) -> Marker {
-    Marker {
-        ns: "boxes".to_owned(),
-        r#type: CUBE,
-        pose: lifted(&place(mounting, object), 0.5 * DRAWN_HEIGHT_M),
-        scale: size(object, DRAWN_HEIGHT_M),
-        color: colour(object, 0.5),
-        ..Marker::default()
-    }
-}
-
-fn arrow(mounting: &Mounting, object: &ListedObject) -> Marker {
-    let at = place(mounting, object).translation.vector;
-    let velocity = mounting.radar().rotation * Vector2::new(object.vx_mps, object.vy_mps);
-    let ahead = planar(at.x, at.y, velocity.y.atan2(velocity.x));
-    Marker {
-        ns: "velocities".to_owned(),
-        r#type: ARROW,
-        pose: lifted(&ahead, DRAWN_HEIGHT_M),
-        scale: Vector3::new(object.speed_mps(), ARROW_M, ARROW_M),
-        color: colour(object, 1.0),
-        ..Marker::default()
-    }
-}
-
-fn name(mounting: &Mounting, object: &ListedObject) -> Marker {
-    Marker {
-        ns: "identities".to_owned(),
-        r#type: TEXT_VIEW_FACING,
-        pose: lifted(&place(mounting, object), DRAWN_HEIGHT_M + LETTER_M),
-        scale: Vector3::new(0.0, 0.0, LETTER_M),
-        color: colour(object, 1.0),
-        text: object.id.to_string(),
-        ..Marker::default()
-    }
 }
 
 /// Orange if it moves, grey if it stands, as in Gyre's own views.

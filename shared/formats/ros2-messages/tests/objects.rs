@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
 use gyre_messages::{ListedObject, ObjectsHeader};
 use gyre_ros2_messages::{
-    Mounting,
-    frames::{Frames, UNKNOWN},
+    Vehicle,
+    frames::UNKNOWN,
     geometry_msgs::Pose,
     objects::{detections, markers},
     vision_msgs::Detection3D,
@@ -46,6 +46,13 @@ fn header() -> ObjectsHeader {
     header
 }
 
+fn vehicle() -> Vehicle {
+    Vehicle {
+        frames: "map,odom,base_link,radar".parse().unwrap(),
+        mounting: "0,0,0".parse().unwrap(),
+    }
+}
+
 fn close(found: &[f64], expected: &[f64]) {
     let far = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-12;
     assert_eq!(found.len(), expected.len());
@@ -62,8 +69,7 @@ fn place(pose: &Pose) -> [f64; 3] {
 #[test]
 fn objects_are_detections_with_identity_class_box_and_covariance() {
     let header = header();
-    let (frames, mounting) = (Frames::default(), Mounting::default());
-    let array = detections(STAMP_NS, &frames, &mounting, header.list());
+    let array = detections(STAMP_NS, &vehicle(), header.list());
     assert_eq!(array.header.stamp.ns(), STAMP_NS);
     assert_eq!(array.header.frame_id, "odom");
     let [car, standing] = &array.detections[..] else {
@@ -95,16 +101,19 @@ fn objects_are_detections_with_identity_class_box_and_covariance() {
 #[test]
 fn objects_are_where_they_are_from_the_vehicle_whose_radar_looks_elsewhere() {
     // The direction ahead of the radar is to the left of the vehicle.
-    let mounting: Mounting = "1,0,90".parse().unwrap();
-    let (header, frames) = (header(), "map,odo,car,top".parse().unwrap());
-    let array = detections(STAMP_NS, &frames, &mounting, header.list());
+    let vehicle = Vehicle {
+        frames: "map,odo,car,top".parse().unwrap(),
+        mounting: "1,0,90".parse().unwrap(),
+    };
+    let header = header();
+    let array = detections(STAMP_NS, &vehicle, header.list());
     assert_eq!(array.header.frame_id, "odo");
     let car = &array.detections[0];
     close(&place(&car.bbox.center), &[-2.0, 20.0, 0.0]);
     let covariance = car.results[0].pose.covariance.elements();
     let found = [0, 1, 6, 7].map(|element| covariance[element]);
     close(&found, &[0.75, -0.125, -0.125, 0.25]);
-    let shapes = markers(STAMP_NS, &frames, &mounting, header.list()).markers;
+    let shapes = markers(STAMP_NS, &vehicle, header.list()).markers;
     let arrow = shapes.iter().find(|it| it.ns == "velocities").unwrap();
     close(&place(&arrow.pose), &[-2.0, 20.0, 0.0]);
 }
@@ -113,8 +122,7 @@ fn objects_are_where_they_are_from_the_vehicle_whose_radar_looks_elsewhere() {
 fn markers_are_boxes_with_identities_and_arrows_of_what_moves() {
     let mut header = header();
     header.list[0].vx_mps = -9.0;
-    let (frames, mounting) = (Frames::default(), Mounting::default());
-    let shapes = markers(STAMP_NS, &frames, &mounting, header.list()).markers;
+    let shapes = markers(STAMP_NS, &vehicle(), header.list()).markers;
     let kinds: Vec<(i32, i32)> = shapes.iter().map(|it| (it.r#type, it.id)).collect();
     let expected = [
         (CUBE, 0),

@@ -39,7 +39,7 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     }
     let topic = &settings.topic;
     if driver.found().map_err(lasting)?.is_none() {
-        let domain = settings.domain.id();
+        let domain = settings.domain.id;
         return Err(AskError::passing(format!(
             "nobody publishes {topic} in domain {domain} of ROS 2: check source.topic, ROS_DOMAIN_ID and source.interface, and that the driver runs"
         )));

@@ -1,18 +1,15 @@
 //! The topics of Navtech's driver.
 
-use std::os::fd::BorrowedFd;
-
 use gyre_colossus::Azimuth;
 use gyre_ros2_messages::{
-    BadMessage, Definition, Ros2Message,
+    Definition, Ros2Message,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     nav_msgs::Odometry,
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     radar::DescribedRadar,
     sensor_msgs::Imu,
-    std_msgs::Header,
 };
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 use gyre_stage::{StageError, clock};
 use ros2_client::{Gid, ReadError, Subscription};
 
@@ -48,24 +45,18 @@ pub enum PacketMessage {
 }
 
 impl PacketMessage {
-    pub fn header(&self) -> &Header {
-        match self {
+    /// Returns the driver's time of receipt, or the present time without one, ns.
+    pub fn arrival_ns(&self) -> i64 {
+        let header = match self {
             Self::Azimuth(message) => &message.header,
             Self::Bytes(message) => &message.header,
             Self::Turn(message) => &message.b_scan_img.header,
-        }
-    }
-
-    /// Returns the driver's time of receipt, or the present time without one, ns.
-    pub fn arrival_ns(&self) -> i64 {
-        match self.header().stamp.ns() {
-            0 => clock::since_1970_ns(),
-            stamp_ns => stamp_ns,
-        }
+        };
+        header.stamp_or(clock::since_1970_ns())
     }
 
     /// Returns the only azimuth; `None` of a turn.
-    pub fn azimuth(&self) -> Result<Option<Azimuth<'_>>, BadMessage> {
+    pub fn azimuth(&self) -> Result<Option<Azimuth<'_>>, String> {
         match self {
             Self::Azimuth(message) => Ok(Some(message.azimuth())),
             Self::Bytes(message) => message.azimuth().map(Some),
@@ -81,7 +72,7 @@ pub struct Driver {
     node: Node,
     topic: String,
     dds_name: String,
-    wakeups: Wakeups,
+    pub wakeups: Wakeups,
     configuration_dds_name: String,
     configurations: Subscription<RadarConfigurationMsg>,
     older: Subscription<RadarConfigurationMessage>,
@@ -90,7 +81,7 @@ pub struct Driver {
     pub sample_wakeups: Wakeups,
     gyro: Option<Subscription<Imu>>,
     wheels: Option<Subscription<Odometry>>,
-    fixes: Option<Fixes>,
+    pub fixes: Option<Fixes>,
 }
 
 impl Driver {
@@ -100,17 +91,17 @@ impl Driver {
         let topic = settings.configuration_topic();
         let mut sample_wakeups = Wakeups::new()?;
         let gyro = settings.gyro_topic.as_deref();
-        let gyro = gyro.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
+        let gyro = gyro.map(|it| sample_wakeups.subscribe(&mut node, it, SAMPLES, true));
         let wheels = settings.wheels_topic.as_deref();
-        let wheels = wheels.map(|it| subscribe(&mut node, &mut sample_wakeups, it, SAMPLES, true));
+        let wheels = wheels.map(|it| sample_wakeups.subscribe(&mut node, it, SAMPLES, true));
         let fixes = settings.fixes.as_ref();
-        let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
+        let fixes = fixes.map(|config| Fixes::open(&mut node, &mut wakeups, config));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
             configuration_dds_name: node.dds_name(&topic)?,
-            configurations: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
-            older: subscribe(&mut node, &mut wakeups, &topic, TURNS, false)?,
+            configurations: wakeups.subscribe(&mut node, &topic, TURNS, false)?,
+            older: wakeups.subscribe(&mut node, &topic, TURNS, false)?,
             azimuths: None,
             gyro: gyro.transpose()?,
             wheels: wheels.transpose()?,
@@ -145,29 +136,18 @@ impl Driver {
         let [azimuth, turn, _] = names();
         let (node, wakeups, topic) = (&mut self.node, &mut self.wakeups, &self.topic);
         self.azimuths = Some(if found == azimuth {
-            let topic = subscribe(node, wakeups, topic, AZIMUTHS, false)?;
-            take(topic, PacketMessage::Azimuth)
+            packets(node, wakeups, topic, AZIMUTHS, PacketMessage::Azimuth)?
         } else if found == turn {
-            let topic = subscribe(node, wakeups, topic, TURNS, false)?;
-            take(topic, PacketMessage::Turn)
+            packets(node, wakeups, topic, TURNS, PacketMessage::Turn)?
         } else {
-            let topic = subscribe(node, wakeups, topic, AZIMUTHS, false)?;
-            take(topic, PacketMessage::Bytes)
+            packets(node, wakeups, topic, AZIMUTHS, PacketMessage::Bytes)?
         });
         Ok(true)
     }
 
-    pub fn descriptor(&self) -> BorrowedFd<'_> {
-        self.wakeups.descriptor()
-    }
-
-    pub fn clear(&mut self) -> Result<(), StageError> {
-        self.wakeups.clear()
-    }
-
     /// Takes the next configuration. A reader also receives messages of the other type, and may
     /// decode them to meaningless numbers: the published type decides.
-    pub fn configuration(&self) -> Result<Option<DescribedRadar>, BadMessage> {
+    pub fn configuration(&self) -> Result<Option<DescribedRadar>, String> {
         if let Ok(Some((message, _))) = self.configurations.take()
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
         {
@@ -185,26 +165,18 @@ impl Driver {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
 
-    /// Takes the next sample of the gyro. The sample of an unreadable message, or one without
-    /// rates, is not a number, so that it is counted.
-    pub fn gyro_sample(&self) -> Option<Sample> {
-        match self.gyro.as_ref()?.take() {
-            Ok(taken) => taken.map(|(imu, _)| imu.sample(clock::since_1970_ns())),
-            Err(_) => Some(Sample::yaw_rate(0, f64::NAN)),
-        }
-    }
-
-    /// Takes the next speed of the wheels; NaN for a message that cannot be read.
-    pub fn wheel_sample(&self) -> Option<Sample> {
-        match self.wheels.as_ref()?.take() {
-            Ok(taken) => taken.map(|(odometry, _)| odometry.sample(clock::since_1970_ns())),
-            Err(_) => Some(Sample::speed(0, f64::NAN)),
-        }
-    }
-
-    pub fn pass_fixes_on(&mut self) {
-        if let Some(fixes) = &mut self.fixes {
-            fixes.pass_on();
+    /// Takes the next sample of the gyro or of the wheels. The sample of an unreadable message, or
+    /// one without rates, is not a number, so that it is counted.
+    pub fn sample(&self, of: SampleKind) -> Option<Sample> {
+        match of {
+            SampleKind::Gyro => match self.gyro.as_ref()?.take() {
+                Ok(taken) => taken.map(|(imu, _)| imu.sample(clock::since_1970_ns())),
+                Err(_) => Some(Sample::yaw_rate(0, f64::NAN)),
+            },
+            SampleKind::Wheels => match self.wheels.as_ref()?.take() {
+                Ok(taken) => taken.map(|(odometry, _)| odometry.sample(clock::since_1970_ns())),
+                Err(_) => Some(Sample::speed(0, f64::NAN)),
+            },
         }
     }
 
@@ -213,27 +185,20 @@ impl Driver {
     }
 }
 
-fn subscribe<M: Ros2Message + Send + 'static>(
+fn packets<M: Ros2Message + Send + 'static>(
     node: &mut Node,
     wakeups: &mut Wakeups,
     topic: &str,
     depth: usize,
-    is_lossy: bool,
-) -> Result<Subscription<M>, StageError> {
-    let mut subscription = node.subscribe(topic, depth, is_lossy)?;
-    wakeups.add(&mut subscription)?;
-    Ok(subscription)
-}
-
-fn take<M: Ros2Message + 'static>(
-    topic: Subscription<M>,
     of: fn(M) -> PacketMessage,
-) -> TakePacket {
-    Box::new(move || {
+) -> Result<TakePacket, StageError> {
+    let topic: Subscription<M> = wakeups.subscribe(node, topic, depth, false)?;
+    let take = move || -> Result<Option<Packet>, ReadError> {
         let taken = topic.take()?;
         Ok(taken.map(|(message, info)| Packet {
             message: of(message),
             publisher: info.publisher_gid(),
         }))
-    })
+    };
+    Ok(Box::new(take))
 }

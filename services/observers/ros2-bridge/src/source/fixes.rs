@@ -4,21 +4,17 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
+use gyre_samples::GnssConfig;
 use gyre_stage::{StageError, clock};
 use ros2_client::Subscription;
 
 use super::wakeups::Wakeups;
 use crate::node::Node;
 
+/// The topic of a GNSS receiver, as `nmea_navsat_driver` names it.
+const FIX: &str = "/fix";
 /// Fixes that are kept: ten seconds of 20 a second.
 const FIXES: usize = 200;
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct FixSettings {
-    pub topic: String,
-    /// Who takes them: where the corrected trajectory receives datagrams.
-    pub listen: String,
-}
 
 /// Passes each message on as the line that a live receiver would send (`gnss.listen`). Fixes do not
 /// travel with scans: no stage needs them.
@@ -33,19 +29,18 @@ impl Fixes {
     pub fn open(
         node: &mut Node,
         wakeups: &mut Wakeups,
-        settings: &FixSettings,
+        config: &GnssConfig,
     ) -> Result<Self, StageError> {
         let failed = |error: io::Error| {
-            let listen = &settings.listen;
+            let listen = &config.listen;
             StageError::Input(format!(
                 "cannot pass the fixes of GNSS on to {listen} (gnss.listen): {error}"
             ))
         };
-        let (socket, listen) = socket_to(&settings.listen).map_err(failed)?;
-        let mut topic = node.subscribe(&settings.topic, FIXES, true)?;
-        wakeups.add(&mut topic)?;
+        let (socket, listen) = socket_to(&config.listen).map_err(failed)?;
+        let topic = config.topic.as_deref().unwrap_or(FIX);
         Ok(Self {
-            topic,
+            topic: wakeups.subscribe(node, topic, FIXES, true)?,
             socket,
             listen,
             has_failed: false,

@@ -100,17 +100,15 @@ impl Radar {
         if !self.intake.is_configured() {
             self.estimate(&packet.message, arrival_ns, bytes.len())?;
         }
+        if let PacketMessage::Turn(turn) = packet.message {
+            return Ok(self.add_turn(turn, 0, header, bytes));
+        }
         match packet.message.azimuth() {
-            Ok(Some(azimuth)) => {
-                return Ok(self.intake.add(azimuth, arrival_ns, header, bytes));
-            }
+            Ok(Some(azimuth)) => return Ok(self.intake.add(azimuth, arrival_ns, header, bytes)),
             Ok(None) => {}
             Err(error) => self.intake.damaged(error, 0),
         }
-        Ok(match packet.message {
-            PacketMessage::Turn(turn) => self.add_turn(turn, 0, header, bytes),
-            _ => false,
-        })
+        Ok(false)
     }
 
     /// Adds the rows of a turn from number `from` on; true if a scan is complete. Without a
@@ -220,13 +218,15 @@ impl Sensor for Radar {
     const HOP: StageId = StageId::RadarReplay;
 
     fn connection(&self) -> Option<BorrowedFd<'_>> {
-        Some(self.driver.descriptor())
+        Some(self.driver.wakeups.descriptor())
     }
 
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
         let is_received = self.driver.receive()?;
-        self.driver.clear()?;
-        self.driver.pass_fixes_on();
+        self.driver.wakeups.clear()?;
+        if let Some(fixes) = &mut self.driver.fixes {
+            fixes.pass_on();
+        }
         self.take_configuration(bytes.len())?;
         if let Some((turn, rows)) = self.turn.take()
             && self.add_turn(turn, rows, header, bytes)
@@ -257,10 +257,7 @@ impl Sensor for Radar {
 
     fn sample(&mut self, of: SampleKind) -> Option<Sample> {
         self.driver.sample_wakeups.clear().ok()?;
-        match of {
-            SampleKind::Gyro => self.driver.gyro_sample(),
-            SampleKind::Wheels => self.driver.wheel_sample(),
-        }
+        self.driver.sample(of)
     }
 
     fn due_ns(&self) -> Option<i64> {

@@ -6,11 +6,14 @@ use std::{
     time::Duration,
 };
 
+use gyre_ros2_messages::Ros2Message;
 use gyre_stage::StageError;
 use ros2_client::{
     Subscription,
-    dds::rustdds::mio1::{Events, Interest, Poll, Token, event::Source},
+    dds::rustdds::mio1::{Events, Interest, Poll, Token},
 };
+
+use crate::node::Node;
 
 /// Events that are taken at once: one for each topic.
 const CAPACITY: usize = 4;
@@ -18,7 +21,6 @@ const CAPACITY: usize = 4;
 pub struct Wakeups {
     poll: Poll,
     events: Events,
-    topics: usize,
 }
 
 impl Wakeups {
@@ -26,20 +28,23 @@ impl Wakeups {
         Ok(Self {
             poll: Poll::new().map_err(failed)?,
             events: Events::with_capacity(CAPACITY),
-            topics: 0,
         })
     }
 
-    pub fn add<M>(&mut self, topic: &mut Subscription<M>) -> Result<(), StageError>
-    where
-        Subscription<M>: Source,
-    {
-        let token = Token(self.topics);
-        self.topics += 1;
-        self.poll
-            .registry()
-            .register(topic, token, Interest::READABLE)
-            .map_err(failed)
+    /// Subscribes to a topic as [`Node::subscribe`]; its messages make the descriptor readable.
+    pub fn subscribe<M: Ros2Message + Send + 'static>(
+        &mut self,
+        node: &mut Node,
+        topic: &str,
+        depth: usize,
+        is_lossy: bool,
+    ) -> Result<Subscription<M>, StageError> {
+        let mut topic: Subscription<M> = node.subscribe(topic, depth, is_lossy)?;
+        // All topics are read after an event of one.
+        let registry = self.poll.registry();
+        let registered = registry.register(&mut topic, Token(0), Interest::READABLE);
+        registered.map_err(failed)?;
+        Ok(topic)
     }
 
     pub fn descriptor(&self) -> BorrowedFd<'_> {

@@ -1,7 +1,7 @@
 //! The receivers of a playback: clients by TCP, or a group by UDP.
 
 use std::{
-    net::{Ipv4Addr, SocketAddrV4, TcpListener, UdpSocket},
+    net::{SocketAddrV4, TcpListener, UdpSocket},
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -26,9 +26,8 @@ const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
 pub enum Output {
     /// Clients by TCP, from the first request for azimuths on.
     Clients(Clients),
-    /// The receivers of the datagrams, if there are any. `wait`: the time before the first scan,
-    /// for which only the radar's description is sent.
-    Group { group: Group, wait: Duration },
+    /// The receivers of the datagrams, if there are any.
+    Group(Group),
 }
 
 impl Output {
@@ -42,10 +41,19 @@ impl Output {
             if arguments.rate.factor().is_none() {
                 return Err("--rate max has no meaning with --udp: the speed at which datagrams are read is unknown; give a factor".into());
             }
-            let wait = arguments.wait_s;
-            let group = Group::open(to, arguments.interface, arguments.faults)?;
-            let (output, address) = (Self::Group { group, wait }, format!("udp://{to}"));
-            return Ok((output, address, !arguments.interface.is_loopback()));
+            // With an unspecified interface the system chooses it.
+            let interface = arguments.interface;
+            let group = Group {
+                socket: UdpSocket::bind((interface, 0)).map_err(unserved)?,
+                to,
+                wait: arguments.wait_s,
+                faults: arguments.faults,
+                number: 0,
+                held: None,
+                lost: 0,
+            };
+            let (output, address) = (Self::Group(group), format!("udp://{to}"));
+            return Ok((output, address, !interface.is_loopback()));
         }
         let listen = &arguments.listen;
         let listener = TcpListener::bind(listen).map_err(|error| {
@@ -59,10 +67,10 @@ impl Output {
 
     /// Describes the radar to a group for the time that was asked for; false on a request to stop.
     pub fn describe(&mut self, radar: &Configuration, stop: &dyn Fn() -> bool) -> bool {
-        let Self::Group { group, wait } = self else {
+        let Self::Group(group) = self else {
             return true;
         };
-        let end = Instant::now() + *wait;
+        let end = Instant::now() + group.wait;
         while Instant::now() < end {
             group.describe(radar);
             if stop() {
@@ -91,7 +99,7 @@ impl Output {
     pub fn send(&mut self, bytes: &[u8]) {
         match self {
             Self::Clients(clients) => clients.send(bytes),
-            Self::Group { group, .. } => group.pass(bytes),
+            Self::Group(group) => group.pass(bytes),
         }
     }
 
@@ -121,6 +129,8 @@ pub(super) fn sleep_until(due: Instant, stop: &dyn Fn() -> bool) -> bool {
 pub struct Group {
     socket: UdpSocket,
     to: SocketAddrV4,
+    /// The time before the first scan, for which only the radar's description is sent.
+    wait: Duration,
     faults: Faults,
     number: u32,
     /// A datagram that is sent after the next one.
@@ -129,18 +139,6 @@ pub struct Group {
 }
 
 impl Group {
-    /// Opens a socket for datagrams that leave by an interface; unspecified: the system chooses it.
-    pub fn open(to: SocketAddrV4, interface: Ipv4Addr, faults: Faults) -> Result<Self, String> {
-        Ok(Self {
-            socket: UdpSocket::bind((interface, 0)).map_err(unserved)?,
-            to,
-            faults,
-            number: 0,
-            held: None,
-            lost: 0,
-        })
-    }
-
     /// Sends the radar's description of itself, and no powers.
     pub fn describe(&mut self, radar: &Configuration) {
         let mut datagram = Vec::new();

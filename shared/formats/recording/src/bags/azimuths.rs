@@ -15,11 +15,10 @@ use crate::bags::{
 };
 
 pub(crate) fn described(form: Form, message: &Message) -> Result<DescribedRadar, String> {
-    let described = match form {
+    match form {
         Form::Numbers => of::<RadarConfigurationMsg>(message)?.configuration(),
         Form::Bytes => of::<RadarConfigurationMessage>(message)?.configuration(),
-    };
-    described.map_err(|e| e.to_string())
+    }
 }
 
 /// Calls `each` with the azimuths in a message of a scan topic and their receive times, ns.
@@ -41,7 +40,7 @@ pub(crate) fn azimuths(
         Kind::Azimuths(Form::Bytes) => {
             let azimuth: RadarFftDataMessage = of(message)?;
             let received_ns = azimuth.header.stamp_or(message.log_ns);
-            each(azimuth.azimuth().map_err(|e| e.to_string())?, received_ns);
+            each(azimuth.azimuth()?, received_ns);
         }
         Kind::BScans => {
             // The stamp in its header is the radar's.
@@ -61,5 +60,5 @@ pub(crate) fn azimuths(
 }
 
 pub(crate) fn of<T: Ros2Message>(message: &Message) -> Result<T, String> {
-    decode(&message.data).map_err(|error| error.to_string())
+    decode(&message.data)
 }

@@ -2,9 +2,7 @@
 
 use gyre_colossus::{Azimuth, Powers};
 
-use crate::{
-    BadMessage, Ros2Message, messages::RadarFftDataMessage, navtech_msgs::RadarFftDataMsg,
-};
+use crate::{Ros2Message, cdr::bad, messages::RadarFftDataMessage, navtech_msgs::RadarFftDataMsg};
 
 impl RadarFftDataMsg {
     /// Returns the azimuth as the radar sent it. The angle comes from the encoder, because
@@ -21,7 +19,7 @@ impl RadarFftDataMsg {
 }
 
 impl RadarFftDataMessage {
-    pub fn azimuth(&self) -> Result<Azimuth<'_>, BadMessage> {
+    pub fn azimuth(&self) -> Result<Azimuth<'_>, String> {
         let sweep_counter = number::<Self, 2>("sweep_counter", &self.sweep_counter)?;
         Ok(Azimuth {
             sweep_counter: u16::from_be_bytes(sweep_counter),
@@ -37,7 +35,7 @@ impl RadarFftDataMessage {
 pub(super) fn number<T: Ros2Message, const N: usize>(
     field: &str,
     bytes: &[u8],
-) -> Result<[u8; N], BadMessage> {
+) -> Result<[u8; N], String> {
     let reason = || format!("`{field}` has {} bytes, expected {N}", bytes.len());
-    bytes.try_into().map_err(|_| BadMessage::of::<T>(reason()))
+    bytes.try_into().map_err(|_| bad::<T>(reason()))
 }

@@ -6,7 +6,7 @@ use gyre_colossus::Configuration;
 
 use super::azimuths::number;
 use crate::{
-    BadMessage, Ros2Message, messages::RadarConfigurationMessage,
+    Ros2Message, cdr::bad, messages::RadarConfigurationMessage,
     navtech_msgs::RadarConfigurationMsg, std_msgs::Header,
 };
 
@@ -27,7 +27,7 @@ pub struct DescribedRadar {
 }
 
 impl RadarConfigurationMsg {
-    pub fn configuration(&self) -> Result<DescribedRadar, BadMessage> {
+    pub fn configuration(&self) -> Result<DescribedRadar, String> {
         let radar = Configuration {
             azimuth_samples: self.azimuth_samples,
             range_in_bins: self.range_in_bins,
@@ -61,7 +61,7 @@ impl RadarConfigurationMsg {
 }
 
 impl RadarConfigurationMessage {
-    pub fn configuration(&self) -> Result<DescribedRadar, BadMessage> {
+    pub fn configuration(&self) -> Result<DescribedRadar, String> {
         let short = |field, bytes: &[u8]| number::<Self, 2>(field, bytes).map(u16::from_be_bytes);
         // Unlike the others: the driver copies the double as its computer has it.
         let bin_size = f64::from_le_bytes(number::<Self, 8>("bin_size", &self.bin_size)?);
@@ -81,12 +81,12 @@ impl RadarConfigurationMessage {
 }
 
 /// Returns the depth of a bin, m, of a `bin_size` in 1e-4 m, or of the oldest drivers in m.
-fn resolution_m<T: Ros2Message>(bin_size: f64) -> Result<f32, BadMessage> {
+fn resolution_m<T: Ros2Message>(bin_size: f64) -> Result<f32, String> {
     let candidates = [bin_size / BIN_SIZES, bin_size];
     let depth_m = candidates.into_iter().find(|m| DEPTHS_M.contains(m));
     depth_m.map(|m| m as f32).ok_or_else(|| {
         let (least, most) = (DEPTHS_M.start(), DEPTHS_M.end());
-        BadMessage::of::<T>(format_args!(
+        bad::<T>(format_args!(
             "`bin_size` is {bin_size:e}, and no radar has bins of that many 0.1 mm or m: {least} to {most} m are known"
         ))
     })
