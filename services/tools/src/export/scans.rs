@@ -33,7 +33,7 @@ pub struct ScanWriter {
     lost: Lost,
     rows: PlacedRows,
     messages: ScanMessages,
-    /// Its topic, until the first scan.
+    /// The topic of the configuration, until the first scan.
     configuration: Option<Topic<RadarConfigurationMsg>>,
     azimuths: Option<Topic<RadarFftDataMsg>>,
     b_scans: Option<Topic<RadarBScanMsg>>,
