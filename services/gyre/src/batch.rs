@@ -16,7 +16,7 @@ use gyre_configuration::paths::shipped;
 use gyre_results::{Content, Out};
 use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
-use gyre_tools::batch::{Batch, Ended, List, Outcome, Settings, compute, table};
+use gyre_tools::batch::{Batch, Ended, List, Outcome, Row, compute, table};
 
 pub use drive::drive;
 
@@ -54,87 +54,74 @@ pub struct BatchArguments {
 /// all are complete, 1 if not, and 130 after an interruption.
 pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
     let list = List::read(&arguments.list)?;
-    let settings = settings(arguments)?;
+    let configuration = arguments.config.as_deref().map(placed).transpose()?;
+    let mut list = list.with(configuration.as_deref(), &arguments.set);
     let share = arguments.task.zip(arguments.tasks);
-    let out = |out: &Path| {
-        let found = out.canonicalize();
-        found.map_err(|error| format!("cannot use {}: {error}", out.display()))
-    };
-    if arguments.collect {
-        let out = out(&arguments.out)?;
-        let mut ended = Ended::default();
-        for row in table::write(&list, &settings, &out)? {
-            *ended.counts.entry(row.outcome).or_default() += 1;
-            if row.outcome != Outcome::Complete {
-                print::note(row.line(false));
-            }
-        }
-        return concluded(&ended, Some(&out));
+    if let Some((task, tasks)) = share {
+        list.drives = list.share(task, tasks)?;
     }
     // Tasks share the folder. A batch without tasks has it for itself, and writes the table.
-    Content::BATCH.require_place(&arguments.out)?;
-    let _lock = match share {
-        None => Some(Out::lock_for(&arguments.out, Content::BATCH)?),
-        Some(_) => None,
-    };
-    gyre_storage::create_folder(&arguments.out)?;
-    let batch = Batch {
-        program: own(),
-        list: &list,
-        drives: match share {
-            Some((task, tasks)) => list.share(task, tasks)?,
-            None => list.drives.clone(),
-        },
-        settings,
-        out: out(&arguments.out)?,
-        // A run alone is bounded by its slowest stage and leaves time unused.
-        jobs: arguments.jobs.map_or_else(processors, usize::from),
-    };
-    let ended = compute(&batch, &Signals::install()?, &mut |line| print::note(line))?;
-    if share.is_some() {
-        return concluded(&ended, None);
-    }
-    table::write(&list, &batch.settings, &batch.out)?;
-    concluded(&ended, Some(&batch.out))
-}
-
-fn settings(arguments: &BatchArguments) -> Result<Settings, Failure> {
-    let unread =
-        |path: &Path, error| format!("cannot read the configuration {}: {error}", path.display());
-    let configuration = arguments.config.as_deref().map(|path| {
-        if let Some(own) = shipped(path) {
-            return Ok(own);
+    let _lock = match (arguments.collect, share) {
+        (true, _) => None,
+        (false, None) => Some(Out::lock_for(&arguments.out, Content::BATCH)?),
+        (false, Some(_)) => {
+            Content::BATCH.require_place(&arguments.out)?;
+            gyre_storage::create_folder(&arguments.out)?;
+            None
         }
-        fs::metadata(path).map_err(|error| unread(path, error))?;
-        absolute(path).map_err(|error| unread(path, error))
-    });
-    Ok(Settings {
-        configuration: configuration.transpose()?,
-        set: arguments.set.clone(),
-    })
-}
-
-fn processors() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
-}
-
-fn concluded(ended: &Ended, table: Option<&Path>) -> Result<ExitCode, Failure> {
-    print::line(sentence(&ended.counts, ended.earlier))?;
-    if let Some(out) = table {
+    };
+    let out = arguments.out.canonicalize();
+    let out = out.map_err(|error| format!("cannot use {}: {error}", arguments.out.display()))?;
+    let ended = match arguments.collect {
+        true => Ended::default(),
+        false => {
+            let processors = thread::available_parallelism().ok();
+            let batch = Batch {
+                program: own(),
+                list: &list,
+                out: &out,
+                jobs: arguments.jobs.or(processors).map_or(1, usize::from),
+            };
+            compute(&batch, &Signals::install()?)?
+        }
+    };
+    let rows = table::read(&list, &out)?;
+    if share.is_none() {
+        table::write(&rows, &out)?;
+    }
+    let mut incomplete = rows.iter().filter(|row| row.outcome != Outcome::Complete);
+    if arguments.collect {
+        let lines = incomplete.clone().map(|row| row.line(false));
+        lines.for_each(print::note);
+    }
+    print::line(sentence(&rows, ended.earlier))?;
+    if share.is_none() {
         let (out, results, times) = (out.display(), table::RESULTS, table::TIMES_FILE);
         print::line(format_args!("table in {out}: {results}, {times}"))?;
     }
-    let mut outcomes = ended.counts.keys();
-    let is_whole = outcomes.all(|outcome| *outcome == Outcome::Complete);
-    Ok(match (ended.interrupted, is_whole) {
+    Ok(match (ended.interrupted, incomplete.next()) {
         (true, _) => ExitCode::from(INTERRUPTED),
-        (false, true) => ExitCode::SUCCESS,
-        (false, false) => ExitCode::FAILURE,
+        (false, None) => ExitCode::SUCCESS,
+        (false, Some(_)) => ExitCode::FAILURE,
     })
 }
 
-fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
-    let drives: usize = counts.values().sum();
+/// Returns the absolute path of a configuration, or its path in the program.
+fn placed(named: &Path) -> Result<PathBuf, Failure> {
+    if let Some(own) = shipped(named) {
+        return Ok(own);
+    }
+    let found = fs::metadata(named).and_then(|_| absolute(named));
+    found.map_err(|error| {
+        format!("cannot read the configuration {}: {error}", named.display()).into()
+    })
+}
+
+fn sentence(rows: &[Row], earlier: usize) -> String {
+    let mut counts = BTreeMap::new();
+    for row in rows {
+        *counts.entry(row.outcome).or_insert(0) += 1;
+    }
     let each = counts.iter();
     let each = each.map(|(outcome, count)| format!("{count} {outcome}"));
     let each = each.collect::<Vec<_>>().join(", ");
@@ -142,9 +129,9 @@ fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
         0 => String::new(),
         earlier => format!("; {earlier} had been computed before"),
     };
-    match drives {
+    match rows.len() {
         0 => "no drives".to_owned(),
         1 => format!("1 drive: {each}{earlier}"),
-        _ => format!("{drives} drives: {each}{earlier}"),
+        drives => format!("{drives} drives: {each}{earlier}"),
     }
 }

@@ -12,4 +12,4 @@ pub mod table;
 
 pub use compute::{Batch, COMMAND, Ended, compute};
 pub use list::{Drive, List};
-pub use row::{End, Outcome, Row, Settings};
+pub use row::{End, Outcome, Row};

@@ -1,10 +1,9 @@
 //! Computes the drives of a batch, several at once.
 
 use std::{
-    collections::BTreeMap,
-    ffi::OsString,
     fs::{File, OpenOptions},
     io::{self, Read, Seek, SeekFrom},
+    mem,
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
     process::{self, Command, ExitStatus, Stdio},
@@ -13,10 +12,10 @@ use std::{
 
 use gyre_stage::wake::Signals;
 use gyre_supervise::last_line;
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, print};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::batch::{Drive, End, List, Outcome, Row, Settings, list::is_configuration};
+use crate::batch::{Drive, End, List, Outcome, Row};
 
 pub const COMMAND: &str = "batch-drive";
 /// The longest time between two polls of the processes; the end of one is noticed at once.
@@ -28,37 +27,31 @@ const TAIL: u64 = 1 << 16;
 pub struct Batch<'a> {
     pub program: PathBuf,
     pub list: &'a List,
-    pub drives: Vec<Drive>,
-    pub settings: Settings,
     /// The folder of the batch, an absolute path without links.
-    pub out: PathBuf,
+    pub out: &'a Path,
     pub jobs: usize,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
-    pub counts: BTreeMap<Outcome, usize>,
     /// The number of drives that had been computed before.
     pub earlier: usize,
     /// True if the batch was interrupted before its end.
     pub interrupted: bool,
 }
 
-/// Computes all drives, and writes the row of each when it has ended. The callback receives a line
-/// for each drive. A request to stop and an error end the runs; their results so far are kept.
-pub fn compute(
-    batch: &Batch<'_>,
-    signals: &Signals,
-    say: &mut dyn FnMut(&str),
-) -> Result<Ended, Failure> {
+/// Computes all drives, writes the row of each when it has ended, and prints a line about it. A
+/// request to stop and an error end the runs; their results so far are kept.
+pub fn compute(batch: &Batch<'_>, signals: &Signals) -> Result<Ended, Failure> {
     for name in ["drives", "output", "rows"] {
         gyre_storage::create_folder(&batch.out.join(name))?;
     }
-    let mut ended = Ended::default();
-    let mut waiting = batch.drives.iter();
+    let (mut ended, mut number) = (Ended::default(), 0);
+    let mut waiting = batch.list.drives.iter();
     let mut running: Vec<Child<'_>> = Vec::new();
     loop {
-        while running.len() < batch.jobs.max(1)
+        while !ended.interrupted
+            && running.len() < batch.jobs
             && let Some(drive) = waiting.next()
         {
             running.push(Child::start(batch, drive)?);
@@ -66,49 +59,31 @@ pub fn compute(
         if running.is_empty() {
             return Ok(ended);
         }
-        ended.interrupted = signals.sleep(POLL_PERIOD)?;
-        if ended.interrupted {
+        if signals.sleep(POLL_PERIOD)? && !ended.interrupted {
+            ended.interrupted = true;
             // All at once, since each may have results to write.
             running.iter_mut().for_each(Child::ask_to_end);
         }
-        let mut rest = Vec::new();
-        for mut child in running {
-            let status = match ended.interrupted {
-                true => Some(child.process.wait()?),
-                false => child.process.try_wait()?,
+        for mut child in mem::take(&mut running) {
+            let Some(status) = child.process.try_wait()? else {
+                running.push(child);
+                continue;
             };
-            match status {
-                Some(status) => {
-                    let end = child.end(status, &batch.out, ended.interrupted);
-                    say(&ended.add(batch, child.drive, end)?);
-                }
-                None => rest.push(child),
+            let end = child.end(status, ended.interrupted);
+            let (mut row, mut note) = (Row::read(batch.out, child.drive), String::new());
+            let is_unchecked = end.earlier && !end.outcome.has_results();
+            if is_unchecked && row.outcome.has_results() {
+                note = format!("; not looked at again: {}", end.sentence);
+            } else {
+                row = Row::of(batch.out, child.drive, end.outcome, end.sentence);
+                row.write(batch.out)?;
             }
+            let is_earlier = end.earlier && row.outcome.has_results();
+            ended.earlier += usize::from(is_earlier);
+            number += 1;
+            let (all, line) = (batch.list.drives.len(), row.line(is_earlier));
+            print::note(format_args!("[{number}/{all}] {line}{note}"));
         }
-        if ended.interrupted {
-            return Ok(ended);
-        }
-        running = rest;
-    }
-}
-
-impl Ended {
-    fn add(&mut self, batch: &Batch<'_>, drive: &Drive, end: End) -> Result<String, Failure> {
-        let Batch { settings, out, .. } = batch;
-        let (mut row, mut note) = (Row::read(out, drive, settings)?, String::new());
-        let is_kept = row.outcome.has_results() && end.unchecked;
-        if is_kept {
-            note = format!("; not looked at again: {}", end.sentence);
-        } else {
-            row = Row::of(out, drive, settings, end.outcome, end.sentence);
-            row.write(out)?;
-        }
-        let earlier = is_kept || end.earlier;
-        *self.counts.entry(row.outcome).or_default() += 1;
-        self.earlier += usize::from(earlier);
-        let number: usize = self.counts.values().sum();
-        let (all, line) = (batch.drives.len(), row.line(earlier));
-        Ok(format!("[{number}/{all}] {line}{note}"))
     }
 }
 
@@ -130,13 +105,10 @@ impl<'a> Child<'a> {
         let output = options.create(true).append(true).read(true).open(&path);
         let output = output.map_err(unwritable)?;
         let begin = output.metadata().map_err(unwritable)?.len();
-        let out = output.try_clone().map_err(unwritable)?;
-        let errors = output.try_clone().map_err(unwritable)?;
-        let process = Command::new(&batch.program)
-            .args(words(batch, drive))
+        let process = command(batch, drive)
             .stdin(Stdio::null())
-            .stdout(out)
-            .stderr(errors)
+            .stdout(output.try_clone().map_err(unwritable)?)
+            .stderr(output.try_clone().map_err(unwritable)?)
             .spawn()
             .map_err(|error| format!("cannot start `{}`: {error}", batch.program.display()))?;
         Ok(Self {
@@ -154,23 +126,19 @@ impl<'a> Child<'a> {
     }
 
     /// Returns the end of the process: its last line, or the cause of its death.
-    fn end(&self, status: ExitStatus, out: &Path, stopped: bool) -> End {
+    fn end(&self, status: ExitStatus, stopped: bool) -> End {
         let printed = self.printed().unwrap_or_default();
-        let last = last_line(&printed).unwrap_or_default();
-        match (status.signal(), serde_json::from_str::<End>(last)) {
-            (None, Ok(end)) => End {
-                // Without the place of the batch the table is the same in each place.
-                sentence: end.sentence.replace(&format!("{}/", out.display()), ""),
-                ..end
-            },
+        let last = last_line(&printed).unwrap_or("it printed nothing");
+        match (status.signal(), serde_json::from_str(last)) {
+            (None, Ok(end)) => end,
+            (None, Err(_)) => End::new(Outcome::Failed, false, last),
             // It was asked to end before it had anything to write.
             (Some(_), _) if stopped => End::interrupted(),
-            (Some(signal), _) => End::of(
+            (Some(signal), _) => End::new(
                 Outcome::Killed,
+                false,
                 format!("its supervisor was killed by signal {signal}: the same command continues"),
             ),
-            (None, Err(_)) if last.is_empty() => End::of(Outcome::Failed, "it printed nothing"),
-            (None, Err(_)) => End::of(Outcome::Failed, last),
         }
     }
 
@@ -190,48 +158,36 @@ impl Drop for Child<'_> {
     }
 }
 
-fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
-    let mut out = OsString::from("--out=");
-    out.push(Row::results(&batch.out, drive));
-    let path = batch.list.resolve(&drive.path);
-    let own = drive.configuration.as_deref();
-    let own = own.map(|named| match batch.list.resolve(named) {
+fn command(batch: &Batch<'_>, drive: &Drive) -> Command {
+    let configuration = drive.configuration.as_deref();
+    let configuration = configuration.map(|named| match batch.list.resolve(named) {
         file if file.is_file() => file,
-        file => gyre_shipped::configuration(Path::new(named)).unwrap_or(file),
+        _ if gyre_shipped::is_own(named) => named.to_owned(),
+        file => gyre_shipped::configuration(named).unwrap_or(file),
     });
-    let mut words = vec![
-        COMMAND.into(),
-        format!("--parent={}", process::id()).into(),
-        out,
-    ];
-    if !is_configuration(&drive.path) {
-        let configuration = own.or_else(|| batch.settings.configuration.clone());
-        words.extend(configuration.map(PathBuf::into_os_string));
-    }
-    words.push(path.into());
-    let set = batch.settings.set.iter().chain(&drive.set);
-    words.extend(set.map(|sentence| format!("--set={sentence}").into()));
-    words
+    let mut command = Command::new(&batch.program);
+    command.arg(COMMAND);
+    command.arg(format!("--parent={}", process::id()));
+    command.arg("--out").arg(Row::results(batch.out, drive));
+    command.args(configuration);
+    command.arg(batch.list.resolve(&drive.path));
+    command.args(drive.set.iter().map(|key| format!("--set={key}")));
+    command
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::fs;
+    use std::{ffi::OsStr, fs};
 
     use super::*;
 
-    fn batch<'a>(list: &'a List, out: &Path, program: &str) -> Batch<'a> {
+    fn batch<'a>(list: &'a List, out: &'a Path, program: &str) -> Batch<'a> {
         fs::create_dir_all(out.join("output")).unwrap();
         Batch {
             program: program.into(),
             list,
-            drives: list.drives.clone(),
-            settings: Settings {
-                configuration: Some("/all.toml".into()),
-                set: vec!["raster.n=127".to_owned()],
-            },
-            out: out.to_owned(),
+            out,
             jobs: 1,
         }
     }
@@ -246,9 +202,14 @@ mod tests {
     fn a_drive_is_a_run_with_its_configuration_or_that_of_the_batch() {
         let folder = tempfile::tempdir().unwrap();
         let text = "drive,configuration,set\n/a,,\n/b,/own.toml,raster.n=63\n/c.toml,,\n";
-        let list = list(folder.path(), text);
+        let set = ["raster.n=127".to_owned()];
+        let list = list(folder.path(), text).with(Some(Path::new("/all.toml")), &set);
         let batch = batch(&list, folder.path(), "gyre");
-        let of = |index: usize| words(&batch, &list.drives[index])[3..].to_vec();
+        let of = |index: usize| {
+            let command = command(&batch, &list.drives[index]);
+            let words: Vec<_> = command.get_args().map(OsStr::to_owned).collect();
+            words[4..].to_vec()
+        };
         assert_eq!(of(0), ["/all.toml", "/a", "--set=raster.n=127"]);
         let own = ["/own.toml", "/b", "--set=raster.n=127", "--set=raster.n=63"];
         assert_eq!(of(1), own);
@@ -268,20 +229,20 @@ mod tests {
         fs::write(folder.path().join("output/a.txt"), "earlier\n").unwrap();
         let mut child = Child::start(&batch, &list.drives[0]).unwrap();
         let status = child.process.wait().unwrap();
-        child.end(status, Path::new("/batch"), false)
+        child.end(status, false)
     }
 
     #[test]
     fn an_end_is_the_last_line_or_the_cause_of_the_death() {
-        let reported = End::of(Outcome::Corrupt, "no /batch/drives/a");
+        let reported = End::new(Outcome::Interrupted, false, "no scans");
         let json = serde_json::to_string(&reported).unwrap();
-        let corrupt = format!("echo words; echo '{json}'");
+        let interrupted = format!("echo words; echo '{json}'");
         for (script, outcome, sentence) in [
-            (&*corrupt, Outcome::Corrupt, "no drives/a"),
+            (&*interrupted, Outcome::Interrupted, "no scans"),
             ("echo some words; exit 101", Outcome::Failed, "some words"),
             ("exit 1", Outcome::Failed, "it printed nothing"),
         ] {
-            assert_eq!(end_of(script), End::of(outcome, sentence));
+            assert_eq!(end_of(script), End::new(outcome, false, sentence));
         }
         let end = end_of(&format!("echo '{json}'; kill -9 $$"));
         assert_eq!(end.outcome, Outcome::Killed);

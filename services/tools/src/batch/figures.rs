@@ -61,12 +61,14 @@ pub(crate) const TIMES: [Column; 9] = [
 /// Digits of a build that distinguish it.
 const BUILD_DIGITS: usize = 12;
 
-pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
+/// Reads the figures of a run that has played all scans, and why they are unreliable, if they are.
+pub(crate) fn read(out: &Path) -> Result<(Values, Option<String>), Failure> {
     let path = out.join("summary.json");
     let text = read_text(&path, SETTINGS)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let summary = serde_json::from_str::<Map<String, Value>>(&text);
     let mut summary = Value::Object(summary.map_err(|error| unknown(&path, error))?);
+    let problem = summary["problem"].as_str().map(str::to_owned);
     let ms = |percentile| Some(summary.pointer(percentile)?.as_f64()? * 1e-3);
     let restarts = summary["restarts"].as_object().into_iter().flatten();
     let restarts: u64 = restarts.filter_map(|(_, count)| count.as_u64()).sum();
@@ -75,18 +77,18 @@ pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
     let (duration_s, path_m) = driven.transpose()?.unzip();
     let begun = read_text(&out.join(gyre_run::BEGUN_WITH), SETTINGS).ok();
     let begun: Option<toml::Table> = begun.and_then(|text| text.parse().ok());
-    let build = begun
-        .as_ref()
-        .and_then(|it| it.get("programs")?.get("build")?.as_str());
-    let derived = json!({
-        "build": build.map(|build| build.chars().take(BUILD_DIGITS).collect::<String>()),
+    let build = |begun: &toml::Table| {
+        let build = begun.get("programs")?.get("build")?.as_str()?;
+        Some(build.get(..BUILD_DIGITS)?.to_owned())
+    };
+    summary["derived"] = json!({
+        "build": begun.as_ref().and_then(build),
         "restarts": restarts,
         "p50_ms": ms("/latency/sensor_to_pose/p50_us"),
         "p99_ms": ms("/latency/sensor_to_pose/p99_us"),
         "duration_s": duration_s,
         "path_m": path_m,
     });
-    summary["derived"] = derived;
     let mut values = Values::new();
     for (name, pointer) in FIGURES.iter().chain(&TIMES) {
         let value = match summary.pointer(pointer) {
@@ -100,7 +102,7 @@ pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
         };
         values.insert((*name).to_owned(), value);
     }
-    Ok(values)
+    Ok((values, problem))
 }
 
 fn driven(path: &Path) -> Result<(f64, f64), Failure> {
@@ -144,7 +146,8 @@ mod tests {
 
     #[test]
     fn values_are_those_of_the_run_and_its_trajectory() {
-        let values = read(run(SUMMARY).path()).unwrap();
+        let (values, problem) = read(run(SUMMARY).path()).unwrap();
+        assert_eq!(problem, None);
         assert_eq!(values["duration_s"], 0.5);
         assert_eq!(values["path_m"], 3.0);
         assert_eq!(values["ate_rmse_m"], 0.12346);
@@ -159,7 +162,7 @@ mod tests {
     fn a_run_of_one_pose_has_no_path_and_an_invalid_summary_is_refused() {
         let out = run(&SUMMARY.replace("\"processed\": 3", "\"processed\": 1"));
         fs::remove_file(out.path().join("trajectory.tum")).unwrap();
-        let values = read(out.path()).unwrap();
+        let (values, _) = read(out.path()).unwrap();
         assert_eq!((&values["poses"], values.get("path_m")), (&json!(1), None));
         for summary in ["{\"processed\": []}", "[]", "3"] {
             let error = read(run(summary).path()).unwrap_err().to_string();

@@ -6,7 +6,7 @@ use gyre_terminal::Failure;
 use serde_json::Value;
 
 use crate::batch::{
-    List, Row, Settings,
+    List, Row,
     figures::{Column, FIGURES, TIMES},
 };
 
@@ -15,8 +15,8 @@ use crate::batch::{
 pub const RESULTS: &str = "results.csv";
 pub const TIMES_FILE: &str = "times.csv";
 
-/// Writes both files from the rows of all drives of a list, which are returned.
-pub fn write(list: &List, settings: &Settings, out: &Path) -> Result<Vec<Row>, Failure> {
+/// Returns the rows of all drives of a list.
+pub fn read(list: &List, out: &Path) -> Result<Vec<Row>, Failure> {
     if !out.join("rows").is_dir() {
         let out = out.display();
         return Err(format!(
@@ -25,42 +25,37 @@ pub fn write(list: &List, settings: &Settings, out: &Path) -> Result<Vec<Row>, F
         .into());
     }
     let drives = list.drives.iter();
-    let rows = drives.map(|drive| Row::read(out, drive, settings));
-    let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
-    let head = |row: &Row| {
-        let (drive, outcome) = (&row.drive, row.outcome.to_string());
-        vec![
-            drive.name.clone(),
-            drive.path.clone(),
-            outcome,
-            row.sentence.clone(),
-        ]
-    };
-    let names = ["name", "drive", "outcome", "sentence"];
-    gyre_storage::write(&out.join(RESULTS), csv(&rows, &names, head, &FIGURES)?)?;
-    let head = |row: &Row| vec![row.drive.name.clone()];
-    gyre_storage::write(&out.join(TIMES_FILE), csv(&rows, &["name"], head, &TIMES)?)?;
-    Ok(rows)
+    Ok(drives.map(|drive| Row::read(out, drive)).collect())
 }
 
-/// Returns a table: of each row the first cells, then its values.
-fn csv(
-    rows: &[Row],
-    names: &[&str],
-    head: fn(&Row) -> Vec<String>,
-    columns: &[Column],
-) -> Result<Vec<u8>, Failure> {
+/// Writes both files.
+pub fn write(rows: &[Row], out: &Path) -> Result<(), Failure> {
+    let first = ["name", "drive", "outcome", "sentence"];
+    gyre_storage::write(&out.join(RESULTS), csv(rows, &first, &FIGURES)?)?;
+    let times = csv(rows, &["name"], &TIMES)?;
+    Ok(gyre_storage::write(&out.join(TIMES_FILE), times)?)
+}
+
+fn csv(rows: &[Row], first: &[&str], columns: &[Column]) -> Result<Vec<u8>, Failure> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(names.iter().copied().chain(columns.iter().map(|it| it.0)))?;
+    let names = first.iter().copied().chain(columns.iter().map(|it| it.0));
+    writer.write_record(names.clone())?;
     for row in rows {
-        let values = columns.iter().map(|(name, _)| match row.values.get(*name) {
-            None => String::new(),
-            Some(Value::String(text)) => text.clone(),
-            Some(other) => other.to_string(),
-        });
-        writer.write_record(head(row).into_iter().chain(values))?;
+        writer.write_record(names.clone().map(|name| cell(row, name)))?;
     }
     Ok(writer.into_inner()?)
+}
+
+fn cell(row: &Row, column: &str) -> String {
+    match (column, row.values.get(column)) {
+        ("name", _) => row.drive.name.clone(),
+        ("drive", _) => row.drive.path.clone(),
+        ("outcome", _) => row.outcome.to_string(),
+        ("sentence", _) => row.sentence.clone(),
+        (_, None) => String::new(),
+        (_, Some(Value::String(text))) => text.clone(),
+        (_, Some(other)) => other.to_string(),
+    }
 }
 
 #[cfg(test)]
@@ -78,15 +73,18 @@ mod tests {
         fs::write(&path, "b\na\nc\n").unwrap();
         let list = List::read(&path).unwrap();
         fs::create_dir(out.join("rows")).unwrap();
-        let settings = Settings::default();
-        let mut row = Row::of(out, &list.drives[1], &settings, Outcome::NotRun, "");
+        let log = out.join("drives/a/log.jsonl");
+        let sentence = format!("no {}", log.display());
+        let mut row = Row::of(out, &list.drives[1], Outcome::NotRun, sentence);
+        assert_eq!(row.sentence, "no drives/a/log.jsonl");
         row.outcome = Outcome::Complete;
         row.values.insert("ate_rmse_m".to_owned(), 0.25.into());
         row.write(out).unwrap();
         fs::create_dir_all(out.join("drives/a/journal")).unwrap();
         fs::write(out.join("drives/a/journal/complete"), "").unwrap();
         fs::write(out.join("rows/c.json"), "{").unwrap();
-        let rows = write(&list, &settings, out).unwrap();
+        let rows = read(&list, out).unwrap();
+        write(&rows, out).unwrap();
         assert_eq!(rows[1], row);
         let damaged = rows[2].line(false);
         assert!(damaged.starts_with("c: not-run") && damaged.contains("c.json is not what"));
