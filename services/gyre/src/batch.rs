@@ -15,8 +15,8 @@ use clap::Args;
 use gyre_configuration::paths::shipped;
 use gyre_results::{Content, Out};
 use gyre_stage::wake::Signals;
-use gyre_terminal::{Failure, INTERRUPTED, own, print};
-use gyre_tools::batch::{Batch, Ended, List, Outcome, Row, compute, table};
+use gyre_terminal::{Failure, INTERRUPTED, print};
+use gyre_tools::batch::{Ended, List, Outcome, Row, compute, table};
 
 pub use drive::drive;
 
@@ -76,13 +76,8 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         true => Ended::default(),
         false => {
             let processors = thread::available_parallelism().ok();
-            let batch = Batch {
-                program: own(),
-                list: &list,
-                out: &out,
-                jobs: arguments.jobs.or(processors).map_or(1, usize::from),
-            };
-            compute(&batch, &Signals::install()?)?
+            let jobs = arguments.jobs.or(processors).map_or(1, usize::from);
+            compute(&list, &out, jobs, &Signals::install()?)?
         }
     };
     let rows = table::read(&list, &out)?;

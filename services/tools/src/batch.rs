@@ -10,6 +10,6 @@ pub mod list;
 mod row;
 pub mod table;
 
-pub use compute::{Batch, COMMAND, Ended, compute};
+pub use compute::{COMMAND, Ended, compute};
 pub use list::{Drive, List};
 pub use row::{End, Outcome, Row};

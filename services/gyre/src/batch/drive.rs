@@ -2,7 +2,6 @@
 //! outcome.
 
 use std::{
-    path::Path,
     process::ExitCode,
     thread,
     time::{Duration, Instant},
@@ -55,9 +54,13 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
         )
         .into());
     }
-    let out = match locked(&run::results_folder(arguments)?) {
-        Err(error @ OutError::Held { .. }) => return unchecked(error.to_string()),
-        out => out?,
+    let (folder, deadline) = (run::results_folder(arguments)?, Instant::now() + ENDING);
+    let out = loop {
+        match Out::lock(&folder) {
+            Err(OutError::Held(_)) if Instant::now() < deadline => thread::sleep(LOOK),
+            Err(held @ OutError::Held(_)) => return unchecked(held.to_string()),
+            out => break out?,
+        }
     };
     // The folder is judged by the run that it is of.
     earlier::settle(&out)?;
@@ -79,16 +82,5 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     match run::compute(configuration, out, discards, Form::Table)? {
         code if code == ExitCode::from(INTERRUPTED) => Ok(End::interrupted()),
         _ => Ok(End::new(Outcome::Complete, false, "")),
-    }
-}
-
-/// Locks the folder of the results, when the run that ends there has ended.
-fn locked(path: &Path) -> Result<Out, OutError> {
-    let deadline = Instant::now() + ENDING;
-    loop {
-        match Out::lock(path) {
-            Err(OutError::Held { .. }) if Instant::now() < deadline => thread::sleep(LOOK),
-            locked => return locked,
-        }
     }
 }

@@ -5,14 +5,14 @@ use std::{
     io::{self, Read, Seek, SeekFrom},
     mem,
     os::unix::process::ExitStatusExt,
-    path::{Path, PathBuf},
+    path::Path,
     process::{self, Command, ExitStatus, Stdio},
     time::Duration,
 };
 
 use gyre_stage::wake::Signals;
 use gyre_supervise::last_line;
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::batch::{Drive, End, List, Outcome, Row};
@@ -23,15 +23,6 @@ const POLL_PERIOD: Duration = Duration::from_secs(1);
 /// Bytes at the end of an output that hold its last line.
 const TAIL: u64 = 1 << 16;
 
-#[derive(Clone, Debug)]
-pub struct Batch<'a> {
-    pub program: PathBuf,
-    pub list: &'a List,
-    /// The folder of the batch, an absolute path without links.
-    pub out: &'a Path,
-    pub jobs: usize,
-}
-
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
     /// The number of drives that had been computed before.
@@ -41,20 +32,26 @@ pub struct Ended {
 }
 
 /// Computes all drives, writes the row of each when it has ended, and prints a line about it. A
-/// request to stop and an error end the runs; their results so far are kept.
-pub fn compute(batch: &Batch<'_>, signals: &Signals) -> Result<Ended, Failure> {
+/// request to stop and an error end the runs; their results so far are kept. `out`: the folder of
+/// the batch, an absolute path without links.
+pub fn compute(list: &List, out: &Path, jobs: usize, signals: &Signals) -> Result<Ended, Failure> {
     for name in ["drives", "output", "rows"] {
-        gyre_storage::create_folder(&batch.out.join(name))?;
+        gyre_storage::create_folder(&out.join(name))?;
     }
     let (mut ended, mut number) = (Ended::default(), 0);
-    let mut waiting = batch.list.drives.iter();
+    let mut waiting = list.drives.iter();
     let mut running: Vec<Child<'_>> = Vec::new();
     loop {
         while !ended.interrupted
-            && running.len() < batch.jobs
+            && running.len() < jobs
             && let Some(drive) = waiting.next()
         {
-            running.push(Child::start(batch, drive)?);
+            let path = out.join("output").join(format!("{}.txt", drive.name));
+            let child = Child::start(drive, command(list, out, drive), &path);
+            let shown = path.display();
+            running.push(
+                child.map_err(|error| format!("cannot run with output to {shown}: {error}"))?,
+            );
         }
         if running.is_empty() {
             return Ok(ended);
@@ -70,18 +67,18 @@ pub fn compute(batch: &Batch<'_>, signals: &Signals) -> Result<Ended, Failure> {
                 continue;
             };
             let end = child.end(status, ended.interrupted);
-            let (mut row, mut note) = (Row::read(batch.out, child.drive), String::new());
+            let (mut row, mut note) = (Row::read(out, child.drive), String::new());
             let is_unchecked = end.earlier && !end.outcome.has_results();
             if is_unchecked && row.outcome.has_results() {
                 note = format!("; not looked at again: {}", end.sentence);
             } else {
-                row = Row::of(batch.out, child.drive, end.outcome, end.sentence);
-                row.write(batch.out)?;
+                row = Row::of(out, child.drive, end.outcome, end.sentence);
+                row.write(out)?;
             }
             let is_earlier = end.earlier && row.outcome.has_results();
             ended.earlier += usize::from(is_earlier);
             number += 1;
-            let (all, line) = (batch.list.drives.len(), row.line(is_earlier));
+            let (all, line) = (list.drives.len(), row.line(is_earlier));
             print::note(format_args!("[{number}/{all}] {line}{note}"));
         }
     }
@@ -97,25 +94,17 @@ struct Child<'a> {
 }
 
 impl<'a> Child<'a> {
-    /// Starts it. Its output is added to `output/NAME.txt`.
-    fn start(batch: &Batch<'_>, drive: &'a Drive) -> Result<Self, Failure> {
-        let path = batch.out.join("output").join(format!("{}.txt", drive.name));
-        let unwritable = |error: io::Error| format!("cannot write to {}: {error}", path.display());
+    /// Starts it, and adds its output to a file.
+    fn start(drive: &'a Drive, mut command: Command, output: &Path) -> io::Result<Self> {
         let mut options = OpenOptions::new();
-        let output = options.create(true).append(true).read(true).open(&path);
-        let output = output.map_err(unwritable)?;
-        let begin = output.metadata().map_err(unwritable)?.len();
-        let process = command(batch, drive)
-            .stdin(Stdio::null())
-            .stdout(output.try_clone().map_err(unwritable)?)
-            .stderr(output.try_clone().map_err(unwritable)?)
-            .spawn()
-            .map_err(|error| format!("cannot start `{}`: {error}", batch.program.display()))?;
+        let output = options.create(true).append(true).read(true).open(output)?;
+        let (out, errors) = (output.try_clone()?, output.try_clone()?);
+        let command = command.stdin(Stdio::null()).stdout(out).stderr(errors);
         Ok(Self {
             drive,
-            process,
+            begin: output.metadata()?.len(),
+            process: command.spawn()?,
             output,
-            begin,
         })
     }
 
@@ -158,19 +147,19 @@ impl Drop for Child<'_> {
     }
 }
 
-fn command(batch: &Batch<'_>, drive: &Drive) -> Command {
+/// Returns the command of a drive, which knows the process that starts it.
+fn command(list: &List, out: &Path, drive: &Drive) -> Command {
     let configuration = drive.configuration.as_deref();
-    let configuration = configuration.map(|named| match batch.list.resolve(named) {
+    let configuration = configuration.map(|named| match list.resolve(named) {
         file if file.is_file() => file,
         _ if gyre_shipped::is_own(named) => named.to_owned(),
         file => gyre_shipped::configuration(named).unwrap_or(file),
     });
-    let mut command = Command::new(&batch.program);
+    let mut command = Command::new(own());
     command.arg(COMMAND);
     command.arg(format!("--parent={}", process::id()));
-    command.arg("--out").arg(Row::results(batch.out, drive));
-    command.args(configuration);
-    command.arg(batch.list.resolve(&drive.path));
+    command.arg("--out").arg(Row::results(out, drive));
+    command.args(configuration).arg(list.resolve(&drive.path));
     command.args(drive.set.iter().map(|key| format!("--set={key}")));
     command
 }
@@ -181,16 +170,6 @@ mod tests {
     use std::{ffi::OsStr, fs};
 
     use super::*;
-
-    fn batch<'a>(list: &'a List, out: &'a Path, program: &str) -> Batch<'a> {
-        fs::create_dir_all(out.join("output")).unwrap();
-        Batch {
-            program: program.into(),
-            list,
-            out,
-            jobs: 1,
-        }
-    }
 
     fn list(folder: &Path, text: &str) -> List {
         let path = folder.join("list.csv");
@@ -204,9 +183,8 @@ mod tests {
         let text = "drive,configuration,set\n/a,,\n/b,/own.toml,raster.n=63\n/c.toml,,\n";
         let set = ["raster.n=127".to_owned()];
         let list = list(folder.path(), text).with(Some(Path::new("/all.toml")), &set);
-        let batch = batch(&list, folder.path(), "gyre");
         let of = |index: usize| {
-            let command = command(&batch, &list.drives[index]);
+            let command = command(&list, folder.path(), &list.drives[index]);
             let words: Vec<_> = command.get_args().map(OsStr::to_owned).collect();
             words[4..].to_vec()
         };
@@ -218,16 +196,14 @@ mod tests {
 
     /// Returns the end of a drive whose program is a shell script.
     fn end_of(script: &str) -> End {
-        use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let program = folder.path().join("program");
-        fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         let list = list(folder.path(), "a\n");
-        let batch = batch(&list, folder.path(), program.to_str().unwrap());
+        let mut program = Command::new("sh");
+        program.args(["-c", script]);
         // An earlier attempt has left its output.
-        fs::write(folder.path().join("output/a.txt"), "earlier\n").unwrap();
-        let mut child = Child::start(&batch, &list.drives[0]).unwrap();
+        let output = folder.path().join("a.txt");
+        fs::write(&output, "earlier\n").unwrap();
+        let mut child = Child::start(&list.drives[0], program, &output).unwrap();
         let status = child.process.wait().unwrap();
         child.end(status, false)
     }

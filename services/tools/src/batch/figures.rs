@@ -72,9 +72,9 @@ pub(crate) fn read(out: &Path) -> Result<(Values, Option<String>), Failure> {
     let ms = |percentile| Some(summary.pointer(percentile)?.as_f64()? * 1e-3);
     let restarts = summary["restarts"].as_object().into_iter().flatten();
     let restarts: u64 = restarts.filter_map(|(_, count)| count.as_u64()).sum();
-    let has_motion = summary["processed"].as_u64() > Some(1);
-    let driven = has_motion.then(|| driven(&out.join("trajectory.tum")));
-    let (duration_s, path_m) = driven.transpose()?.unzip();
+    let trajectory = read_trajectory(&out.join("trajectory.tum")).ok();
+    let trajectory = trajectory.filter(|it| it.poses.len() > 1);
+    let span_ns = trajectory.as_ref().and_then(|it| it.span_ns());
     let begun = read_text(&out.join(gyre_run::BEGUN_WITH), SETTINGS).ok();
     let begun: Option<toml::Table> = begun.and_then(|text| text.parse().ok());
     let build = |begun: &toml::Table| {
@@ -86,8 +86,8 @@ pub(crate) fn read(out: &Path) -> Result<(Values, Option<String>), Failure> {
         "restarts": restarts,
         "p50_ms": ms("/latency/sensor_to_pose/p50_us"),
         "p99_ms": ms("/latency/sensor_to_pose/p99_us"),
-        "duration_s": duration_s,
-        "path_m": path_m,
+        "duration_s": span_ns.map(|(first, last)| (last - first) as f64 * 1e-9),
+        "path_m": trajectory.map(|it| path_m(&it.poses)),
     });
     let mut values = Values::new();
     for (name, pointer) in FIGURES.iter().chain(&TIMES) {
@@ -103,14 +103,6 @@ pub(crate) fn read(out: &Path) -> Result<(Values, Option<String>), Failure> {
         values.insert((*name).to_owned(), value);
     }
     Ok((values, problem))
-}
-
-fn driven(path: &Path) -> Result<(f64, f64), Failure> {
-    let trajectory = read_trajectory(path).map_err(|error| unknown(path, error))?;
-    match trajectory.span_ns() {
-        Some((first, last)) => Ok(((last - first) as f64 * 1e-9, path_m(&trajectory.poses))),
-        None => Err(unknown(path, "it has no stamps").into()),
-    }
 }
 
 /// Returns a sentence about a file with an invalid content.

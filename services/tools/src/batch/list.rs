@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    ffi::OsStr,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -41,17 +42,8 @@ pub struct List {
     folder: PathBuf,
 }
 
-/// The lines that name drives, with their numbers.
-type Lines = Vec<(u64, Line)>;
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Line {
-    drive: String,
-    name: Option<String>,
-    configuration: Option<PathBuf>,
-    set: String,
-}
+/// The lines that name drives: their numbers, and their cells in the order of the columns.
+type Lines = Vec<(u64, [String; 4])>;
 
 impl List {
     /// Reads a list. Relative paths in it are relative to its folder.
@@ -72,7 +64,7 @@ impl List {
         };
         let (mut drives, mut seen) = (Vec::new(), BTreeMap::new());
         for (number, line) in lines {
-            let drive = line.drive().map_err(|reason| refused(number, reason))?;
+            let drive = drive(line).map_err(|reason| refused(number, reason))?;
             if let Some(first) = seen.insert(drive.name.clone(), number) {
                 let name = drive.name;
                 return Err(refused(number, format!("the drive of line {first} is named `{name}` too: give them different names in the column `name`")).into());
@@ -121,18 +113,20 @@ fn entries(folder: &Path) -> io::Result<Lines> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let (path, name) = (entry.path(), entry.file_name());
-        let bytes = name.as_encoded_bytes();
+        let name = name.to_string_lossy().into_owned();
         // macOS adds files of its own to an archive.
-        let is_hidden = bytes.starts_with(b".") || bytes == b"__MACOSX";
+        let is_hidden = name.starts_with('.') || name == "__MACOSX";
         if !is_hidden && (path.is_dir() || ends_in(&path, "mcap")) {
-            let name = name.into_string();
-            names.push(
-                name.map_err(|name| io::Error::other(format!("the name {name:?} is not UTF-8")))?,
-            );
+            names.push(name);
         }
     }
     names.sort();
-    Ok((1..).zip(names.into_iter().map(Line::of)).collect())
+    Ok((1..).zip(names.into_iter().map(cells)).collect())
+}
+
+/// Returns the cells of a line that is a path.
+fn cells(path: String) -> [String; 4] {
+    [path, String::new(), String::new(), String::new()]
 }
 
 /// The error is the number of a line, and its fault.
@@ -142,10 +136,9 @@ fn lines(text: &str) -> Result<Lines, (u64, String)> {
     let is_header = |line: &str| line.split(',').any(|column| column.trim() == "drive");
     match lines.clone().next() {
         Some((_, first)) if is_header(first) => table(text),
-        _ => {
-            let lines = lines.map(|(number, path)| (number, Line::of(path.to_owned())));
-            Ok(lines.collect())
-        }
+        _ => Ok(lines
+            .map(|(line, path)| (line, cells(path.to_owned())))
+            .collect()),
     }
 }
 
@@ -164,12 +157,13 @@ fn table(text: &str) -> Result<Lines, (u64, String)> {
         let unknown = format!("there is no column `{column}`; there are {known}");
         return Err((1, unknown));
     }
+    let places = COLUMNS.map(|column| header.iter().position(|it| it == column));
     let mut lines = Lines::new();
     for record in reader.records() {
         let record = record.map_err(fault)?;
-        let number = record.position().map_or(1, csv::Position::line);
-        let line: Line = record.deserialize(Some(&header)).map_err(fault)?;
-        lines.push((number, line));
+        let line = record.position().map_or(1, csv::Position::line);
+        let cell = |place: Option<usize>| place.and_then(|place| record.get(place));
+        lines.push((line, places.map(|it| cell(it).unwrap_or("").to_owned())));
     }
     Ok(lines)
 }
@@ -178,48 +172,33 @@ fn ends_in(path: impl AsRef<Path>, extension: &str) -> bool {
     path.as_ref().extension().is_some_and(|it| it == extension)
 }
 
-impl Line {
-    fn of(path: String) -> Self {
-        Self {
-            drive: path,
-            ..Self::default()
-        }
+/// Returns the drive of a line, named after its path unless the line names it.
+fn drive([path, name, configuration, set]: [String; 4]) -> Result<Drive, String> {
+    if path.is_empty() {
+        return Err("the column `drive` is empty: it is the path of the recording".to_owned());
     }
-
-    /// Returns the drive, named after its path unless the line has its name.
-    fn drive(self) -> Result<Drive, String> {
-        let (path, set) = (self.drive, self.set);
-        if path.is_empty() {
-            return Err("the column `drive` is empty: it is the path of the recording".to_owned());
-        }
-        if self.configuration.is_some() && ends_in(&path, "toml") {
-            return Err(format!(
-                "`{path}` is a configuration itself: leave its column `configuration` empty"
-            ));
-        }
-        let last = match ends_in(&path, "mcap") || ends_in(&path, "toml") {
-            true => Path::new(&path).file_stem(),
-            false => Path::new(&path).file_name(),
-        };
-        let last = last.and_then(|last| last.to_str()).map(str::to_owned);
-        let none = || format!("`{path}` has no name: give one in the column `name`");
-        let name = self.name.or(last).ok_or_else(none)?;
-        let is_plain = |c: char| c != '/' && !c.is_control();
-        let is_valid = !name.starts_with('.') && (1..=MAX_NAME).contains(&name.len());
-        if !is_valid || !name.chars().all(is_plain) {
-            return Err(format!(
-                "`{name}` cannot be the name of a drive: files are named after it, so it begins with no dot, has no slash and at most \
-                 {MAX_NAME} bytes; give a different name in the column `name`"
-            ));
-        }
-        let unclosed = || format!("the column `set` is `{set}`, with a quote that is not closed");
-        Ok(Drive {
-            set: shlex::split(&set).ok_or_else(unclosed)?,
-            configuration: self.configuration,
-            name,
-            path,
-        })
+    let name = match ends_in(&path, "mcap") || ends_in(&path, "toml") {
+        _ if !name.is_empty() => Some(OsStr::new(&name)),
+        true => Path::new(&path).file_stem(),
+        false => Path::new(&path).file_name(),
+    };
+    let none = || format!("`{path}` has no name: give one in the column `name`");
+    let name = name.and_then(OsStr::to_str).ok_or_else(none)?.to_owned();
+    let is_plain = |c: char| c != '/' && !c.is_control();
+    let is_valid = !name.starts_with('.') && (1..=MAX_NAME).contains(&name.len());
+    if !is_valid || !name.chars().all(is_plain) {
+        return Err(format!(
+            "`{name}` cannot be the name of a drive: files are named after it, so it begins with no dot, has no slash and at most \
+             {MAX_NAME} bytes; give a different name in the column `name`"
+        ));
     }
+    let unclosed = || format!("the column `set` is `{set}`, with a quote that is not closed");
+    Ok(Drive {
+        configuration: (!configuration.is_empty()).then(|| configuration.into()),
+        set: shlex::split(&set).ok_or_else(unclosed)?,
+        name,
+        path,
+    })
 }
 
 #[cfg(test)]
