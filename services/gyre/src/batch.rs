@@ -1,7 +1,5 @@
 //! `gyre batch`: a run for each of many drives.
 
-mod drive;
-
 use std::{
     collections::BTreeMap,
     fs,
@@ -9,16 +7,27 @@ use std::{
     path::{Path, PathBuf, absolute},
     process::ExitCode,
     thread,
+    time::{Duration, Instant},
 };
 
 use clap::Args;
 use gyre_configuration::paths::shipped;
-use gyre_results::{Content, Out};
-use gyre_stage::wake::Signals;
+use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
+use gyre_stage::{run::end_with, wake::Signals};
 use gyre_terminal::{Failure, INTERRUPTED, print};
-use gyre_tools::batch::{Ended, List, Outcome, Row, compute, table};
+use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
+use rustix::process::Signal;
 
-pub use drive::drive;
+use crate::{
+    arguments::RunArguments,
+    earlier::{self, Earlier},
+    program,
+    run::{self, resolve},
+};
+
+/// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.
+const ENDING: Duration = Duration::from_secs(60);
+const LOOK: Duration = Duration::from_millis(200);
 
 #[derive(Debug, Args)]
 pub struct BatchArguments {
@@ -61,19 +70,17 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         list.drives = list.share(task, tasks)?;
     }
     // Tasks share the folder. A batch without tasks has it for itself, and writes the table.
-    let _lock = match (arguments.collect, share) {
-        (true, _) => None,
-        (false, None) => Some(Out::lock_for(&arguments.out, Content::BATCH)?),
-        (false, Some(_)) => {
-            Content::BATCH.require_place(&arguments.out)?;
-            gyre_storage::create_folder(&arguments.out)?;
-            None
-        }
-    };
+    let is_alone = share.is_none() && !arguments.collect;
+    let lock = is_alone.then(|| Out::lock_for(&arguments.out, Content::BATCH));
+    let _lock = lock.transpose()?;
+    if share.is_some() {
+        Content::BATCH.require_place(&arguments.out)?;
+        gyre_storage::create_folder(&arguments.out)?;
+    }
     let out = arguments.out.canonicalize();
     let out = out.map_err(|error| format!("cannot use {}: {error}", arguments.out.display()))?;
-    let ended = match arguments.collect {
-        true => Ended::default(),
+    let (earlier, interrupted) = match arguments.collect {
+        true => (0, false),
         false => {
             let processors = thread::available_parallelism().ok();
             let jobs = arguments.jobs.or(processors).map_or(1, usize::from);
@@ -81,20 +88,19 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         }
     };
     let rows = table::read(&list, &out)?;
+    let mut said = sentence(&rows, earlier);
     if share.is_none() {
         table::write(&rows, &out)?;
+        let (out, results, times) = (out.display(), table::RESULTS, table::TIMES_FILE);
+        said += &format!("\ntable in {out}: {results}, {times}");
     }
     let mut incomplete = rows.iter().filter(|row| row.outcome != Outcome::Complete);
     if arguments.collect {
         let lines = incomplete.clone().map(|row| row.line(false));
         lines.for_each(print::note);
     }
-    print::line(sentence(&rows, ended.earlier))?;
-    if share.is_none() {
-        let (out, results, times) = (out.display(), table::RESULTS, table::TIMES_FILE);
-        print::line(format_args!("table in {out}: {results}, {times}"))?;
-    }
-    Ok(match (ended.interrupted, incomplete.next()) {
+    print::line(said)?;
+    Ok(match (interrupted, incomplete.next()) {
         (true, _) => ExitCode::from(INTERRUPTED),
         (false, None) => ExitCode::SUCCESS,
         (false, Some(_)) => ExitCode::FAILURE,
@@ -128,5 +134,63 @@ fn sentence(rows: &[Row], earlier: usize) -> String {
         0 => "no drives".to_owned(),
         1 => format!("1 drive: {each}{earlier}"),
         drives => format!("{drives} drives: {each}{earlier}"),
+    }
+}
+
+/// Computes a drive in a process of its own, unless it has been computed with the same
+/// configuration from the same scans, and prints its end.
+pub fn drive(parent: i32, run: &RunArguments) -> Result<ExitCode, Failure> {
+    if !end_with(parent, Signal::TERM)? {
+        return Ok(ExitCode::FAILURE);
+    }
+    let end =
+        computed(run).unwrap_or_else(|error| End::new(Outcome::Failed, false, error.to_string()));
+    print::line(serde_json::to_string(&end)?)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn computed(arguments: &RunArguments) -> Result<End, Failure> {
+    let unchecked = |reason: String| Ok(End::new(Outcome::Failed, true, reason));
+    // The recording may have been removed since the batch began.
+    if let Some(path) = arguments.inputs.what.last()
+        && matches!(path.try_exists(), Ok(false))
+        && shipped(path).is_none()
+    {
+        return unchecked(format!("there is nothing at {}", path.display()));
+    }
+    let mut configuration = resolve(arguments)?;
+    if configuration.is_radar() || configuration.source.repeat {
+        return Err(format!(
+            "the configuration is of {}, which has no end: a batch is of recordings and simulations",
+            configuration.data()
+        )
+        .into());
+    }
+    let (folder, deadline) = (run::results_folder(arguments)?, Instant::now() + ENDING);
+    let out = loop {
+        match Out::lock(&folder) {
+            Err(OutError::Held(_)) if Instant::now() < deadline => thread::sleep(LOOK),
+            Err(held @ OutError::Held(_)) => return unchecked(held.to_string()),
+            out => break out?,
+        }
+    };
+    // The folder is judged by the run that it is of.
+    earlier::settle(&out)?;
+    run::place_recording(&mut configuration, &out);
+    // By whatever build. `None`: a run reports files that cannot be read, and keeps its poses.
+    let is_same = Identity::read(&out)
+        .and_then(|begun| begun.has_inputs_of(&configuration, &program::replaced(&configuration)?))
+        .ok();
+    let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
+    if is_complete && is_same == Some(true) {
+        return Ok(End::new(Outcome::Complete, true, ""));
+    }
+    // A run of another configuration, build or version is discarded.
+    let earlier = Earlier::of(&out, &configuration, &program::now(&configuration)?, false)?;
+    let is_foreign = matches!(earlier, Earlier::Foreign(_) | Earlier::Complete(_));
+    let discards = is_foreign || is_same == Some(false);
+    match run::compute(configuration, out, discards, Form::Table)? {
+        code if code == ExitCode::from(INTERRUPTED) => Ok(End::interrupted()),
+        _ => Ok(End::new(Outcome::Complete, false, "")),
     }
 }

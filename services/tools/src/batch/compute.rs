@@ -20,44 +20,39 @@ use crate::batch::{Drive, End, List, Outcome, Row};
 pub const COMMAND: &str = "batch-drive";
 /// The longest time between two polls of the processes; the end of one is noticed at once.
 const POLL_PERIOD: Duration = Duration::from_secs(1);
-/// Bytes at the end of an output that hold its last line.
-const TAIL: u64 = 1 << 16;
-
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Ended {
-    /// The number of drives that had been computed before.
-    pub earlier: usize,
-    /// True if the batch was interrupted before its end.
-    pub interrupted: bool,
-}
 
 /// Computes all drives, writes the row of each when it has ended, and prints a line about it. A
 /// request to stop and an error end the runs; their results so far are kept. `out`: the folder of
-/// the batch, an absolute path without links.
-pub fn compute(list: &List, out: &Path, jobs: usize, signals: &Signals) -> Result<Ended, Failure> {
+/// the batch, an absolute path without links. Returns the number of drives that had been computed
+/// before, and whether the batch was interrupted.
+pub fn compute(
+    list: &List,
+    out: &Path,
+    jobs: usize,
+    signals: &Signals,
+) -> Result<(usize, bool), Failure> {
     for name in ["drives", "output", "rows"] {
         gyre_storage::create_folder(&out.join(name))?;
     }
-    let (mut ended, mut number) = (Ended::default(), 0);
+    let (mut number, mut earlier, mut interrupted) = (0, 0, false);
     let mut waiting = list.drives.iter();
     let mut running: Vec<Child<'_>> = Vec::new();
     loop {
-        while !ended.interrupted
+        while !interrupted
             && running.len() < jobs
             && let Some(drive) = waiting.next()
         {
             let path = out.join("output").join(format!("{}.txt", drive.name));
             let child = Child::start(drive, command(list, out, drive), &path);
-            let shown = path.display();
-            running.push(
-                child.map_err(|error| format!("cannot run with output to {shown}: {error}"))?,
-            );
+            let path = path.display();
+            let child = child.map_err(|error| format!("cannot run, printing to {path}: {error}"));
+            running.push(child?);
         }
         if running.is_empty() {
-            return Ok(ended);
+            return Ok((earlier, interrupted));
         }
-        if signals.sleep(POLL_PERIOD)? && !ended.interrupted {
-            ended.interrupted = true;
+        if signals.sleep(POLL_PERIOD)? && !interrupted {
+            interrupted = true;
             // All at once, since each may have results to write.
             running.iter_mut().for_each(Child::ask_to_end);
         }
@@ -66,7 +61,7 @@ pub fn compute(list: &List, out: &Path, jobs: usize, signals: &Signals) -> Resul
                 running.push(child);
                 continue;
             };
-            let end = child.end(status, ended.interrupted);
+            let end = child.end(status, interrupted);
             let (mut row, mut note) = (Row::read(out, child.drive), String::new());
             let is_unchecked = end.earlier && !end.outcome.has_results();
             if is_unchecked && row.outcome.has_results() {
@@ -76,7 +71,7 @@ pub fn compute(list: &List, out: &Path, jobs: usize, signals: &Signals) -> Resul
                 row.write(out)?;
             }
             let is_earlier = end.earlier && row.outcome.has_results();
-            ended.earlier += usize::from(is_earlier);
+            earlier += usize::from(is_earlier);
             number += 1;
             let (all, line) = (list.drives.len(), row.line(is_earlier));
             print::note(format_args!("[{number}/{all}] {line}{note}"));
@@ -116,7 +111,10 @@ impl<'a> Child<'a> {
 
     /// Returns the end of the process: its last line, or the cause of its death.
     fn end(&self, status: ExitStatus, stopped: bool) -> End {
-        let printed = self.printed().unwrap_or_default();
+        let (mut file, mut bytes) = (&self.output, Vec::new());
+        let begin = file.seek(SeekFrom::Start(self.begin));
+        let _ = begin.and_then(|_| file.read_to_end(&mut bytes));
+        let printed = String::from_utf8_lossy(&bytes);
         let last = last_line(&printed).unwrap_or("it printed nothing");
         match (status.signal(), serde_json::from_str(last)) {
             (None, Ok(end)) => end,
@@ -129,14 +127,6 @@ impl<'a> Child<'a> {
                 format!("its supervisor was killed by signal {signal}: the same command continues"),
             ),
         }
-    }
-
-    fn printed(&self) -> io::Result<String> {
-        let (mut file, mut bytes) = (&self.output, Vec::new());
-        let tail = file.metadata()?.len().saturating_sub(TAIL);
-        file.seek(SeekFrom::Start(self.begin.max(tail)))?;
-        file.take(TAIL).read_to_end(&mut bytes)?;
-        Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 }
 

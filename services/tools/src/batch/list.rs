@@ -184,9 +184,8 @@ fn drive([path, name, configuration, set]: [String; 4]) -> Result<Drive, String>
     };
     let none = || format!("`{path}` has no name: give one in the column `name`");
     let name = name.and_then(OsStr::to_str).ok_or_else(none)?.to_owned();
-    let is_plain = |c: char| c != '/' && !c.is_control();
-    let is_valid = !name.starts_with('.') && (1..=MAX_NAME).contains(&name.len());
-    if !is_valid || !name.chars().all(is_plain) {
+    let is_special = |c: char| c == '/' || c.is_control();
+    if name.starts_with('.') || name.len() > MAX_NAME || name.contains(is_special) {
         return Err(format!(
             "`{name}` cannot be the name of a drive: files are named after it, so it begins with no dot, has no slash and at most \
              {MAX_NAME} bytes; give a different name in the column `name`"

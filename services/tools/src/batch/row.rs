@@ -1,7 +1,7 @@
 //! The end of a drive, and its row: `rows/NAME.json`. The rows are the table.
 
 use std::{
-    fmt, io,
+    fmt,
     path::{Path, PathBuf},
 };
 
@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::batch::{
     Drive,
-    figures::{self, Values},
+    table::{self, Values},
 };
 
 /// The outcome of a drive: the column `outcome` of the table.
@@ -87,29 +87,26 @@ pub struct Row {
 impl Row {
     /// The row of a drive that has ended in the folder of a batch.
     pub fn of(batch: &Path, drive: &Drive, outcome: Outcome, sentence: impl Into<String>) -> Self {
-        let mut row = Self {
+        let (values, problem) = match outcome {
+            Outcome::Complete => match table::values(&Self::results(batch, drive)) {
+                Ok(read) => read,
+                Err(error) => return Self::of(batch, drive, Outcome::Failed, error),
+            },
+            _ => (Values::new(), None),
+        };
+        let outcome = match &problem {
+            None => outcome,
+            Some(problem) if problem.contains(HARDLY_MEASURED) => Outcome::Unsure,
+            Some(_) => Outcome::Corrupt,
+        };
+        let sentence = problem.unwrap_or_else(|| sentence.into());
+        Self {
             drive: drive.clone(),
             outcome,
-            sentence: sentence.into(),
-            values: Values::new(),
-        };
-        if outcome == Outcome::Complete {
-            match figures::read(&Self::results(batch, drive)) {
-                Ok((values, problem)) => {
-                    row.values = values;
-                    row.outcome = match &problem {
-                        None => Outcome::Complete,
-                        Some(problem) if problem.contains(HARDLY_MEASURED) => Outcome::Unsure,
-                        Some(_) => Outcome::Corrupt,
-                    };
-                    row.sentence = problem.unwrap_or_default();
-                }
-                Err(error) => (row.outcome, row.sentence) = (Outcome::Failed, error.to_string()),
-            }
+            // Without the place of the batch the table is the same in each place.
+            sentence: sentence.replace(&format!("{}/", batch.display()), ""),
+            values,
         }
-        // Without the place of the batch the table is the same in each place.
-        row.sentence = row.sentence.replace(&format!("{}/", batch.display()), "");
-        row
     }
 
     pub fn results(batch: &Path, drive: &Drive) -> PathBuf {
@@ -130,23 +127,16 @@ impl Row {
     /// one the outcome is `not-run`.
     pub fn read(batch: &Path, drive: &Drive) -> Self {
         let path = Self::path(batch, drive);
-        let reason = match gyre_storage::read_text(&path, gyre_storage::SETTINGS) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                "it has not been computed yet".to_owned()
+        let has_results = || Self::results(batch, drive).join(COMPLETE).exists();
+        let reason = match table::read_json::<Self>(&path) {
+            _ if !path.exists() => "it has not been computed yet".to_owned(),
+            Err(reason) => reason,
+            Ok(row) if row.drive != *drive => "it was computed with other settings".to_owned(),
+            // A run that begins removes the results before it.
+            Ok(row) if row.outcome.has_results() && !has_results() => {
+                "its results are being computed again, or were removed".to_owned()
             }
-            Err(error) => format!("cannot read {}: {error}", path.display()),
-            Ok(text) => match serde_json::from_str::<Self>(&text) {
-                Err(error) => figures::unknown(&path, error),
-                Ok(row) if row.drive != *drive => "it was computed with other settings".to_owned(),
-                // A run that begins removes the results before it.
-                Ok(row)
-                    if row.outcome.has_results()
-                        && !Self::results(batch, drive).join(COMPLETE).exists() =>
-                {
-                    "its results are being computed again, or were removed".to_owned()
-                }
-                Ok(row) => return row,
-            },
+            Ok(row) => return row,
         };
         Self::of(batch, drive, Outcome::NotRun, reason)
     }
