@@ -13,7 +13,7 @@ use std::{
 use clap::Args;
 use gyre_configuration::paths::shipped;
 use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
-use gyre_stage::{run::end_with, wake::Signals};
+use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
 use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
 use rustix::process::Signal;
@@ -79,15 +79,18 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
     }
     let out = arguments.out.canonicalize();
     let out = out.map_err(|error| format!("cannot use {}: {error}", arguments.out.display()))?;
+    if arguments.collect && !out.join("rows").is_dir() {
+        let reason = "is not the folder of a batch: no drive has been computed there";
+        return Err(format!("{} {reason}", out.display()).into());
+    }
+    let processors = thread::available_parallelism().ok();
+    let jobs = arguments.jobs.or(processors).map_or(1, usize::from);
     let (earlier, interrupted) = match arguments.collect {
         true => (0, false),
-        false => {
-            let processors = thread::available_parallelism().ok();
-            let jobs = arguments.jobs.or(processors).map_or(1, usize::from);
-            compute(&list, &out, jobs, &Signals::install()?)?
-        }
+        false => compute(&list, &out, jobs)?,
     };
-    let rows = table::read(&list, &out)?;
+    let drives = list.drives.iter();
+    let rows: Vec<_> = drives.map(|drive| Row::read(&out, drive)).collect();
     let mut said = sentence(&rows, earlier);
     if share.is_none() {
         table::write(&rows, &out)?;
@@ -112,10 +115,9 @@ fn placed(named: &Path) -> Result<PathBuf, Failure> {
     if let Some(own) = shipped(named) {
         return Ok(own);
     }
-    let found = fs::metadata(named).and_then(|_| absolute(named));
-    found.map_err(|error| {
-        format!("cannot read the configuration {}: {error}", named.display()).into()
-    })
+    let (found, shown) = (fs::metadata(named), named.display());
+    let placed = found.and_then(|_| absolute(named));
+    placed.map_err(|error| format!("cannot read the configuration {shown}: {error}").into())
 }
 
 fn sentence(rows: &[Row], earlier: usize) -> String {
@@ -152,10 +154,8 @@ pub fn drive(parent: i32, run: &RunArguments) -> Result<ExitCode, Failure> {
 fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     let unchecked = |reason: String| Ok(End::new(Outcome::Failed, true, reason));
     // The recording may have been removed since the batch began.
-    if let Some(path) = arguments.inputs.what.last()
-        && matches!(path.try_exists(), Ok(false))
-        && shipped(path).is_none()
-    {
+    let is_missing = |path: &&PathBuf| !path.exists() && shipped(path).is_none();
+    if let Some(path) = arguments.inputs.what.last().filter(is_missing) {
         return unchecked(format!("there is nothing at {}", path.display()));
     }
     let mut configuration = resolve(arguments)?;

@@ -1,7 +1,7 @@
 //! Computes the drives of a batch, several at once.
 
 use std::{
-    fs::{File, OpenOptions},
+    fs::File,
     io::{self, Read, Seek, SeekFrom},
     mem,
     os::unix::process::ExitStatusExt,
@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_stage::wake::Signals;
+use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::last_line;
 use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
@@ -25,12 +25,8 @@ const POLL_PERIOD: Duration = Duration::from_secs(1);
 /// request to stop and an error end the runs; their results so far are kept. `out`: the folder of
 /// the batch, an absolute path without links. Returns the number of drives that had been computed
 /// before, and whether the batch was interrupted.
-pub fn compute(
-    list: &List,
-    out: &Path,
-    jobs: usize,
-    signals: &Signals,
-) -> Result<(usize, bool), Failure> {
+pub fn compute(list: &List, out: &Path, jobs: usize) -> Result<(usize, bool), Failure> {
+    let signals = Signals::install()?;
     for name in ["drives", "output", "rows"] {
         gyre_storage::create_folder(&out.join(name))?;
     }
@@ -44,9 +40,7 @@ pub fn compute(
         {
             let path = out.join("output").join(format!("{}.txt", drive.name));
             let child = Child::start(drive, command(list, out, drive), &path);
-            let path = path.display();
-            let child = child.map_err(|error| format!("cannot run, printing to {path}: {error}"));
-            running.push(child?);
+            running.push(child.map_err(StageError::file(&path))?);
         }
         if running.is_empty() {
             return Ok((earlier, interrupted));
@@ -83,21 +77,20 @@ pub fn compute(
 struct Child<'a> {
     drive: &'a Drive,
     process: process::Child,
+    /// The output of this process; before it are those of earlier ones.
     output: File,
-    /// Bytes of the output before the output of this process.
-    begin: u64,
 }
 
 impl<'a> Child<'a> {
     /// Starts it, and adds its output to a file.
-    fn start(drive: &'a Drive, mut command: Command, output: &Path) -> io::Result<Self> {
-        let mut options = OpenOptions::new();
-        let output = options.create(true).append(true).read(true).open(output)?;
-        let (out, errors) = (output.try_clone()?, output.try_clone()?);
-        let command = command.stdin(Stdio::null()).stdout(out).stderr(errors);
+    fn start(drive: &'a Drive, mut command: Command, path: &Path) -> io::Result<Self> {
+        let out = File::options().create(true).append(true).open(path)?;
+        let errors = out.try_clone()?;
+        let mut output = File::open(path)?;
+        output.seek(SeekFrom::End(0))?;
+        command.stdin(Stdio::null()).stdout(out).stderr(errors);
         Ok(Self {
             drive,
-            begin: output.metadata()?.len(),
             process: command.spawn()?,
             output,
         })
@@ -111,9 +104,8 @@ impl<'a> Child<'a> {
 
     /// Returns the end of the process: its last line, or the cause of its death.
     fn end(&self, status: ExitStatus, stopped: bool) -> End {
-        let (mut file, mut bytes) = (&self.output, Vec::new());
-        let begin = file.seek(SeekFrom::Start(self.begin));
-        let _ = begin.and_then(|_| file.read_to_end(&mut bytes));
+        let mut bytes = Vec::new();
+        let _ = (&self.output).read_to_end(&mut bytes);
         let printed = String::from_utf8_lossy(&bytes);
         let last = last_line(&printed).unwrap_or("it printed nothing");
         match (status.signal(), serde_json::from_str(last)) {

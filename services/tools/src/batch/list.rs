@@ -66,8 +66,7 @@ impl List {
         for (number, line) in lines {
             let drive = drive(line).map_err(|reason| refused(number, reason))?;
             if let Some(first) = seen.insert(drive.name.clone(), number) {
-                let name = drive.name;
-                return Err(refused(number, format!("the drive of line {first} is named `{name}` too: give them different names in the column `name`")).into());
+                return Err(refused(number, format!("the drive of line {first} is named `{}` too: give them different names in the column `name`", drive.name)).into());
             }
             drives.push(drive);
         }
@@ -111,13 +110,12 @@ impl List {
 fn entries(folder: &Path) -> io::Result<Lines> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        let (path, name) = (entry.path(), entry.file_name());
-        let name = name.to_string_lossy().into_owned();
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
         // macOS adds files of its own to an archive.
         let is_hidden = name.starts_with('.') || name == "__MACOSX";
         if !is_hidden && (path.is_dir() || ends_in(&path, "mcap")) {
-            names.push(name);
+            names.push(name.into_owned());
         }
     }
     names.sort();

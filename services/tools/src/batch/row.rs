@@ -11,10 +11,7 @@ use gyre_terminal::Failure;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::batch::{
-    Drive,
-    table::{self, Values},
-};
+use crate::batch::{Drive, table};
 
 /// The outcome of a drive: the column `outcome` of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -81,7 +78,7 @@ pub struct Row {
     /// The reason why it is not complete, in a sentence; else empty.
     pub sentence: String,
     /// The values of both tables by column; empty unless all scans were played.
-    pub values: Values,
+    pub values: table::Values,
 }
 
 impl Row {
@@ -92,7 +89,7 @@ impl Row {
                 Ok(read) => read,
                 Err(error) => return Self::of(batch, drive, Outcome::Failed, error),
             },
-            _ => (Values::new(), None),
+            _ => (table::Values::new(), None),
         };
         let outcome = match &problem {
             None => outcome,

@@ -10,7 +10,7 @@ use gyre_terminal::Failure;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-use crate::batch::{List, Row};
+use crate::batch::Row;
 
 /// The file of the results that follow from the drives and their configurations: the same bytes
 /// whatever was killed.
@@ -67,9 +67,6 @@ const TIMES: [Column; 9] = [
     ("bound_by", "/latency/bound_by"),
 ];
 
-/// Digits of a build that distinguish it.
-const BUILD_DIGITS: usize = 12;
-
 /// Reads the figures of a run that has played all scans, and why they are unreliable, if they are.
 pub(crate) fn values(out: &Path) -> Result<(Values, Option<String>), String> {
     let path = out.join("summary.json");
@@ -85,7 +82,8 @@ pub(crate) fn values(out: &Path) -> Result<(Values, Option<String>), String> {
     let begun: Option<toml::Table> = begun.and_then(|text| text.parse().ok());
     let build = |begun: &toml::Table| {
         let build = begun.get("programs")?.get("build")?.as_str()?;
-        Some(build.get(..BUILD_DIGITS)?.to_owned())
+        // So many digits distinguish it.
+        Some(build.get(..12)?.to_owned())
     };
     summary["derived"] = json!({
         "build": begun.as_ref().and_then(build),
@@ -125,20 +123,7 @@ fn unknown(path: &Path, reason: impl Display) -> String {
     )
 }
 
-/// Returns the rows of all drives of a list.
-pub fn read(list: &List, out: &Path) -> Result<Vec<Row>, Failure> {
-    if !out.join("rows").is_dir() {
-        let out = out.display();
-        return Err(format!(
-            "{out} is not the folder of a batch: no drive has been computed there"
-        )
-        .into());
-    }
-    let drives = list.drives.iter();
-    Ok(drives.map(|drive| Row::read(out, drive)).collect())
-}
-
-/// Writes both files.
+/// Writes both files from the rows of all drives.
 pub fn write(rows: &[Row], out: &Path) -> Result<(), Failure> {
     let first = ["name", "drive", "outcome", "sentence"];
     gyre_storage::write(&out.join(RESULTS), csv(rows, &first, &FIGURES)?)?;
@@ -174,7 +159,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::batch::Outcome;
+    use crate::batch::{List, Outcome};
 
     const SUMMARY: &str = r#"{
         "version": "0.1.0", "machine": {"processor": "CPU", "cores": 2}, "scans_in_recording": 3, "resumed_after": 1,
@@ -235,7 +220,7 @@ mod tests {
         fs::create_dir_all(out.join("drives/a/journal")).unwrap();
         fs::write(out.join("drives/a/journal/complete"), "").unwrap();
         fs::write(out.join("rows/c.json"), "{").unwrap();
-        let rows = read(&list, out).unwrap();
+        let rows: Vec<_> = list.drives.iter().map(|it| Row::read(out, it)).collect();
         write(&rows, out).unwrap();
         assert_eq!(rows[1], row);
         let damaged = rows[2].line(false);
