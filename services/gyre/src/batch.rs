@@ -1,7 +1,5 @@
 //! `gyre batch`: a run for each of many drives.
 
-mod drive;
-
 use std::{
     collections::BTreeMap,
     fs,
@@ -9,16 +7,27 @@ use std::{
     path::{Path, PathBuf, absolute},
     process::ExitCode,
     thread,
+    time::{Duration, Instant},
 };
 
 use clap::Args;
 use gyre_configuration::paths::shipped;
-use gyre_results::{Content, Out};
-use gyre_stage::wake::Signals;
-use gyre_terminal::{Failure, INTERRUPTED, own, print};
-use gyre_tools::batch::{Batch, Ended, List, Outcome, Settings, compute, table};
+use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
+use gyre_stage::run::end_with;
+use gyre_terminal::{Failure, INTERRUPTED, print};
+use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
+use rustix::process::Signal;
 
-pub use drive::drive;
+use crate::{
+    arguments::RunArguments,
+    earlier::{self, Earlier},
+    program,
+    run::{self, resolve},
+};
+
+/// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.
+const ENDING: Duration = Duration::from_secs(60);
+const LOOK: Duration = Duration::from_millis(200);
 
 #[derive(Debug, Args)]
 pub struct BatchArguments {
@@ -54,87 +63,68 @@ pub struct BatchArguments {
 /// all are complete, 1 if not, and 130 after an interruption.
 pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
     let list = List::read(&arguments.list)?;
-    let settings = settings(arguments)?;
+    let configuration = arguments.config.as_deref().map(placed).transpose()?;
+    let mut list = list.with(configuration.as_deref(), &arguments.set);
     let share = arguments.task.zip(arguments.tasks);
-    let out = |out: &Path| {
-        let found = out.canonicalize();
-        found.map_err(|error| format!("cannot use {}: {error}", out.display()))
-    };
-    if arguments.collect {
-        let out = out(&arguments.out)?;
-        let mut ended = Ended::default();
-        for row in table::write(&list, &settings, &out)? {
-            *ended.counts.entry(row.outcome).or_default() += 1;
-            if row.outcome != Outcome::Complete {
-                print::note(row.line(false));
-            }
-        }
-        return concluded(&ended, Some(&out));
+    if let Some((task, tasks)) = share {
+        list.drives = list.share(task, tasks)?;
     }
     // Tasks share the folder. A batch without tasks has it for itself, and writes the table.
-    Content::BATCH.require_place(&arguments.out)?;
-    let _lock = match share {
-        None => Some(Out::lock_for(&arguments.out, Content::BATCH)?),
-        Some(_) => None,
-    };
-    gyre_storage::create_folder(&arguments.out)?;
-    let batch = Batch {
-        program: own(),
-        list: &list,
-        drives: match share {
-            Some((task, tasks)) => list.share(task, tasks)?,
-            None => list.drives.clone(),
-        },
-        settings,
-        out: out(&arguments.out)?,
-        // A run alone is bounded by its slowest stage and leaves time unused.
-        jobs: arguments.jobs.map_or_else(processors, usize::from),
-    };
-    let ended = compute(&batch, &Signals::install()?, &mut |line| print::note(line))?;
+    let is_alone = share.is_none() && !arguments.collect;
+    let lock = is_alone.then(|| Out::lock_for(&arguments.out, Content::BATCH));
+    let _lock = lock.transpose()?;
     if share.is_some() {
-        return concluded(&ended, None);
+        Content::BATCH.require_place(&arguments.out)?;
+        gyre_storage::create_folder(&arguments.out)?;
     }
-    table::write(&list, &batch.settings, &batch.out)?;
-    concluded(&ended, Some(&batch.out))
-}
-
-fn settings(arguments: &BatchArguments) -> Result<Settings, Failure> {
-    let unread =
-        |path: &Path, error| format!("cannot read the configuration {}: {error}", path.display());
-    let configuration = arguments.config.as_deref().map(|path| {
-        if let Some(own) = shipped(path) {
-            return Ok(own);
-        }
-        fs::metadata(path).map_err(|error| unread(path, error))?;
-        absolute(path).map_err(|error| unread(path, error))
-    });
-    Ok(Settings {
-        configuration: configuration.transpose()?,
-        set: arguments.set.clone(),
-    })
-}
-
-fn processors() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
-}
-
-fn concluded(ended: &Ended, table: Option<&Path>) -> Result<ExitCode, Failure> {
-    print::line(sentence(&ended.counts, ended.earlier))?;
-    if let Some(out) = table {
+    let out = arguments.out.canonicalize();
+    let out = out.map_err(|error| format!("cannot use {}: {error}", arguments.out.display()))?;
+    if arguments.collect && !out.join("rows").is_dir() {
+        let reason = "is not the folder of a batch: no drive has been computed there";
+        return Err(format!("{} {reason}", out.display()).into());
+    }
+    let processors = thread::available_parallelism().ok();
+    let jobs = arguments.jobs.or(processors).map_or(1, usize::from);
+    let (earlier, interrupted) = match arguments.collect {
+        true => (0, false),
+        false => compute(&list, &out, jobs)?,
+    };
+    let drives = list.drives.iter();
+    let rows: Vec<_> = drives.map(|drive| Row::read(&out, drive)).collect();
+    let mut said = sentence(&rows, earlier);
+    if share.is_none() {
+        table::write(&rows, &out)?;
         let (out, results, times) = (out.display(), table::RESULTS, table::TIMES_FILE);
-        print::line(format_args!("table in {out}: {results}, {times}"))?;
+        said += &format!("\ntable in {out}: {results}, {times}");
     }
-    let mut outcomes = ended.counts.keys();
-    let is_whole = outcomes.all(|outcome| *outcome == Outcome::Complete);
-    Ok(match (ended.interrupted, is_whole) {
+    let mut incomplete = rows.iter().filter(|row| row.outcome != Outcome::Complete);
+    if arguments.collect {
+        let lines = incomplete.clone().map(|row| row.line(false));
+        lines.for_each(print::note);
+    }
+    print::line(said)?;
+    Ok(match (interrupted, incomplete.next()) {
         (true, _) => ExitCode::from(INTERRUPTED),
-        (false, true) => ExitCode::SUCCESS,
-        (false, false) => ExitCode::FAILURE,
+        (false, None) => ExitCode::SUCCESS,
+        (false, Some(_)) => ExitCode::FAILURE,
     })
 }
 
-fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
-    let drives: usize = counts.values().sum();
+/// Returns the absolute path of a configuration, or its path in the program.
+fn placed(named: &Path) -> Result<PathBuf, Failure> {
+    if let Some(own) = shipped(named) {
+        return Ok(own);
+    }
+    let (found, shown) = (fs::metadata(named), named.display());
+    let placed = found.and_then(|_| absolute(named));
+    placed.map_err(|error| format!("cannot read the configuration {shown}: {error}").into())
+}
+
+fn sentence(rows: &[Row], earlier: usize) -> String {
+    let mut counts = BTreeMap::new();
+    for row in rows {
+        *counts.entry(row.outcome).or_insert(0) += 1;
+    }
     let each = counts.iter();
     let each = each.map(|(outcome, count)| format!("{count} {outcome}"));
     let each = each.collect::<Vec<_>>().join(", ");
@@ -142,9 +132,65 @@ fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
         0 => String::new(),
         earlier => format!("; {earlier} had been computed before"),
     };
-    match drives {
+    match rows.len() {
         0 => "no drives".to_owned(),
         1 => format!("1 drive: {each}{earlier}"),
-        _ => format!("{drives} drives: {each}{earlier}"),
+        drives => format!("{drives} drives: {each}{earlier}"),
+    }
+}
+
+/// Computes a drive in a process of its own, unless it has been computed with the same
+/// configuration from the same scans, and prints its end.
+pub fn drive(parent: i32, run: &RunArguments) -> Result<ExitCode, Failure> {
+    if !end_with(parent, Signal::TERM)? {
+        return Ok(ExitCode::FAILURE);
+    }
+    let end =
+        computed(run).unwrap_or_else(|error| End::new(Outcome::Failed, false, error.to_string()));
+    print::line(serde_json::to_string(&end)?)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn computed(arguments: &RunArguments) -> Result<End, Failure> {
+    let unchecked = |reason: String| Ok(End::new(Outcome::Failed, true, reason));
+    // The recording may have been removed since the batch began.
+    let is_missing = |path: &&PathBuf| !path.exists() && shipped(path).is_none();
+    if let Some(path) = arguments.inputs.what.last().filter(is_missing) {
+        return unchecked(format!("there is nothing at {}", path.display()));
+    }
+    let mut configuration = resolve(arguments)?;
+    if configuration.is_radar() || configuration.source.repeat {
+        return Err(format!(
+            "the configuration is of {}, which has no end: a batch is of recordings and simulations",
+            configuration.data()
+        )
+        .into());
+    }
+    let (folder, deadline) = (run::results_folder(arguments)?, Instant::now() + ENDING);
+    let out = loop {
+        match Out::lock(&folder) {
+            Err(OutError::Held(_)) if Instant::now() < deadline => thread::sleep(LOOK),
+            Err(held @ OutError::Held(_)) => return unchecked(held.to_string()),
+            out => break out?,
+        }
+    };
+    // The folder is judged by the run that it is of.
+    earlier::settle(&out)?;
+    run::place_recording(&mut configuration, &out);
+    // By whatever build. `None`: a run reports files that cannot be read, and keeps its poses.
+    let is_same = Identity::read(&out)
+        .and_then(|begun| begun.has_inputs_of(&configuration, &program::replaced(&configuration)?))
+        .ok();
+    let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
+    if is_complete && is_same == Some(true) {
+        return Ok(End::new(Outcome::Complete, true, ""));
+    }
+    // A run of another configuration, build or version is discarded.
+    let earlier = Earlier::of(&out, &configuration, &program::now(&configuration)?, false)?;
+    let is_foreign = matches!(earlier, Earlier::Foreign(_) | Earlier::Complete(_));
+    let discards = is_foreign || is_same == Some(false);
+    match run::compute(configuration, out, discards, Form::Table)? {
+        code if code == ExitCode::from(INTERRUPTED) => Ok(End::interrupted()),
+        _ => Ok(End::new(Outcome::Complete, false, "")),
     }
 }

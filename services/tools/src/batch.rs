@@ -5,11 +5,10 @@
 //! share only the folder, so that they can run on many computers.
 
 mod compute;
-mod figures;
 pub mod list;
 mod row;
 pub mod table;
 
-pub use compute::{Batch, COMMAND, Ended, compute};
+pub use compute::{COMMAND, compute};
 pub use list::{Drive, List};
-pub use row::{End, Outcome, Row, Settings};
+pub use row::{End, Outcome, Row};

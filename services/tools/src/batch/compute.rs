@@ -1,114 +1,75 @@
 //! Computes the drives of a batch, several at once.
 
 use std::{
-    collections::BTreeMap,
-    ffi::OsString,
-    fs::{File, OpenOptions},
+    fs::File,
     io::{self, Read, Seek, SeekFrom},
+    mem,
     os::unix::process::ExitStatusExt,
-    path::{Path, PathBuf},
+    path::Path,
     process::{self, Command, ExitStatus, Stdio},
     time::Duration,
 };
 
-use gyre_stage::wake::Signals;
+use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::last_line;
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::batch::{Drive, End, List, Outcome, Row, Settings, list::is_configuration};
+use crate::batch::{Drive, End, List, Outcome, Row};
 
 pub const COMMAND: &str = "batch-drive";
 /// The longest time between two polls of the processes; the end of one is noticed at once.
 const POLL_PERIOD: Duration = Duration::from_secs(1);
-/// Bytes at the end of an output that hold its last line.
-const TAIL: u64 = 1 << 16;
 
-#[derive(Clone, Debug)]
-pub struct Batch<'a> {
-    pub program: PathBuf,
-    pub list: &'a List,
-    pub drives: Vec<Drive>,
-    pub settings: Settings,
-    /// The folder of the batch, an absolute path without links.
-    pub out: PathBuf,
-    pub jobs: usize,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Ended {
-    pub counts: BTreeMap<Outcome, usize>,
-    /// The number of drives that had been computed before.
-    pub earlier: usize,
-    /// True if the batch was interrupted before its end.
-    pub interrupted: bool,
-}
-
-/// Computes all drives, and writes the row of each when it has ended. The callback receives a line
-/// for each drive. A request to stop and an error end the runs; their results so far are kept.
-pub fn compute(
-    batch: &Batch<'_>,
-    signals: &Signals,
-    say: &mut dyn FnMut(&str),
-) -> Result<Ended, Failure> {
+/// Computes all drives, writes the row of each when it has ended, and prints a line about it. A
+/// request to stop and an error end the runs; their results so far are kept. `out`: the folder of
+/// the batch, an absolute path without links. Returns the number of drives that had been computed
+/// before, and whether the batch was interrupted.
+pub fn compute(list: &List, out: &Path, jobs: usize) -> Result<(usize, bool), Failure> {
+    let signals = Signals::install()?;
     for name in ["drives", "output", "rows"] {
-        gyre_storage::create_folder(&batch.out.join(name))?;
+        gyre_storage::create_folder(&out.join(name))?;
     }
-    let mut ended = Ended::default();
-    let mut waiting = batch.drives.iter();
+    let (mut number, mut earlier, mut interrupted) = (0, 0, false);
+    let mut waiting = list.drives.iter();
     let mut running: Vec<Child<'_>> = Vec::new();
     loop {
-        while running.len() < batch.jobs.max(1)
+        while !interrupted
+            && running.len() < jobs
             && let Some(drive) = waiting.next()
         {
-            running.push(Child::start(batch, drive)?);
+            let path = out.join("output").join(format!("{}.txt", drive.name));
+            let child = Child::start(drive, command(list, out, drive), &path);
+            running.push(child.map_err(StageError::file(&path))?);
         }
         if running.is_empty() {
-            return Ok(ended);
+            return Ok((earlier, interrupted));
         }
-        ended.interrupted = signals.sleep(POLL_PERIOD)?;
-        if ended.interrupted {
+        if signals.sleep(POLL_PERIOD)? && !interrupted {
+            interrupted = true;
             // All at once, since each may have results to write.
             running.iter_mut().for_each(Child::ask_to_end);
         }
-        let mut rest = Vec::new();
-        for mut child in running {
-            let status = match ended.interrupted {
-                true => Some(child.process.wait()?),
-                false => child.process.try_wait()?,
+        for mut child in mem::take(&mut running) {
+            let Some(status) = child.process.try_wait()? else {
+                running.push(child);
+                continue;
             };
-            match status {
-                Some(status) => {
-                    let end = child.end(status, &batch.out, ended.interrupted);
-                    say(&ended.add(batch, child.drive, end)?);
-                }
-                None => rest.push(child),
+            let end = child.end(status, interrupted);
+            let (mut row, mut note) = (Row::read(out, child.drive), String::new());
+            let is_unchecked = end.earlier && !end.outcome.has_results();
+            if is_unchecked && row.outcome.has_results() {
+                note = format!("; not looked at again: {}", end.sentence);
+            } else {
+                row = Row::of(out, child.drive, end.outcome, end.sentence);
+                row.write(out)?;
             }
+            let is_earlier = end.earlier && row.outcome.has_results();
+            earlier += usize::from(is_earlier);
+            number += 1;
+            let (all, line) = (list.drives.len(), row.line(is_earlier));
+            print::note(format_args!("[{number}/{all}] {line}{note}"));
         }
-        if ended.interrupted {
-            return Ok(ended);
-        }
-        running = rest;
-    }
-}
-
-impl Ended {
-    fn add(&mut self, batch: &Batch<'_>, drive: &Drive, end: End) -> Result<String, Failure> {
-        let Batch { settings, out, .. } = batch;
-        let (mut row, mut note) = (Row::read(out, drive, settings)?, String::new());
-        let is_kept = row.outcome.has_results() && end.unchecked;
-        if is_kept {
-            note = format!("; not looked at again: {}", end.sentence);
-        } else {
-            row = Row::of(out, drive, settings, end.outcome, end.sentence);
-            row.write(out)?;
-        }
-        let earlier = is_kept || end.earlier;
-        *self.counts.entry(row.outcome).or_default() += 1;
-        self.earlier += usize::from(earlier);
-        let number: usize = self.counts.values().sum();
-        let (all, line) = (batch.drives.len(), row.line(earlier));
-        Ok(format!("[{number}/{all}] {line}{note}"))
     }
 }
 
@@ -116,34 +77,22 @@ impl Ended {
 struct Child<'a> {
     drive: &'a Drive,
     process: process::Child,
+    /// The output of this process; before it are those of earlier ones.
     output: File,
-    /// Bytes of the output before the output of this process.
-    begin: u64,
 }
 
 impl<'a> Child<'a> {
-    /// Starts it. Its output is added to `output/NAME.txt`.
-    fn start(batch: &Batch<'_>, drive: &'a Drive) -> Result<Self, Failure> {
-        let path = batch.out.join("output").join(format!("{}.txt", drive.name));
-        let unwritable = |error: io::Error| format!("cannot write to {}: {error}", path.display());
-        let mut options = OpenOptions::new();
-        let output = options.create(true).append(true).read(true).open(&path);
-        let output = output.map_err(unwritable)?;
-        let begin = output.metadata().map_err(unwritable)?.len();
-        let out = output.try_clone().map_err(unwritable)?;
-        let errors = output.try_clone().map_err(unwritable)?;
-        let process = Command::new(&batch.program)
-            .args(words(batch, drive))
-            .stdin(Stdio::null())
-            .stdout(out)
-            .stderr(errors)
-            .spawn()
-            .map_err(|error| format!("cannot start `{}`: {error}", batch.program.display()))?;
+    /// Starts it, and adds its output to a file.
+    fn start(drive: &'a Drive, mut command: Command, path: &Path) -> io::Result<Self> {
+        let out = File::options().create(true).append(true).open(path)?;
+        let errors = out.try_clone()?;
+        let mut output = File::open(path)?;
+        output.seek(SeekFrom::End(0))?;
+        command.stdin(Stdio::null()).stdout(out).stderr(errors);
         Ok(Self {
             drive,
-            process,
+            process: command.spawn()?,
             output,
-            begin,
         })
     }
 
@@ -154,32 +103,22 @@ impl<'a> Child<'a> {
     }
 
     /// Returns the end of the process: its last line, or the cause of its death.
-    fn end(&self, status: ExitStatus, out: &Path, stopped: bool) -> End {
-        let printed = self.printed().unwrap_or_default();
-        let last = last_line(&printed).unwrap_or_default();
-        match (status.signal(), serde_json::from_str::<End>(last)) {
-            (None, Ok(end)) => End {
-                // Without the place of the batch the table is the same in each place.
-                sentence: end.sentence.replace(&format!("{}/", out.display()), ""),
-                ..end
-            },
+    fn end(&self, status: ExitStatus, stopped: bool) -> End {
+        let mut bytes = Vec::new();
+        let _ = (&self.output).read_to_end(&mut bytes);
+        let printed = String::from_utf8_lossy(&bytes);
+        let last = last_line(&printed).unwrap_or("it printed nothing");
+        match (status.signal(), serde_json::from_str(last)) {
+            (None, Ok(end)) => end,
+            (None, Err(_)) => End::new(Outcome::Failed, false, last),
             // It was asked to end before it had anything to write.
             (Some(_), _) if stopped => End::interrupted(),
-            (Some(signal), _) => End::of(
+            (Some(signal), _) => End::new(
                 Outcome::Killed,
+                false,
                 format!("its supervisor was killed by signal {signal}: the same command continues"),
             ),
-            (None, Err(_)) if last.is_empty() => End::of(Outcome::Failed, "it printed nothing"),
-            (None, Err(_)) => End::of(Outcome::Failed, last),
         }
-    }
-
-    fn printed(&self) -> io::Result<String> {
-        let (mut file, mut bytes) = (&self.output, Vec::new());
-        let tail = file.metadata()?.len().saturating_sub(TAIL);
-        file.seek(SeekFrom::Start(self.begin.max(tail)))?;
-        file.take(TAIL).read_to_end(&mut bytes)?;
-        Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 }
 
@@ -190,51 +129,29 @@ impl Drop for Child<'_> {
     }
 }
 
-fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
-    let mut out = OsString::from("--out=");
-    out.push(Row::results(&batch.out, drive));
-    let path = batch.list.resolve(&drive.path);
-    let own = drive.configuration.as_deref();
-    let own = own.map(|named| match batch.list.resolve(named) {
+/// Returns the command of a drive, which knows the process that starts it.
+fn command(list: &List, out: &Path, drive: &Drive) -> Command {
+    let configuration = drive.configuration.as_deref();
+    let configuration = configuration.map(|named| match list.resolve(named) {
         file if file.is_file() => file,
-        file => gyre_shipped::configuration(Path::new(named)).unwrap_or(file),
+        _ if gyre_shipped::is_own(named) => named.to_owned(),
+        file => gyre_shipped::configuration(named).unwrap_or(file),
     });
-    let mut words = vec![
-        COMMAND.into(),
-        format!("--parent={}", process::id()).into(),
-        out,
-    ];
-    if !is_configuration(&drive.path) {
-        let configuration = own.or_else(|| batch.settings.configuration.clone());
-        words.extend(configuration.map(PathBuf::into_os_string));
-    }
-    words.push(path.into());
-    let set = batch.settings.set.iter().chain(&drive.set);
-    words.extend(set.map(|sentence| format!("--set={sentence}").into()));
-    words
+    let mut command = Command::new(own());
+    command.arg(COMMAND);
+    command.arg(format!("--parent={}", process::id()));
+    command.arg("--out").arg(Row::results(out, drive));
+    command.args(configuration).arg(list.resolve(&drive.path));
+    command.args(drive.set.iter().map(|key| format!("--set={key}")));
+    command
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::fs;
+    use std::{ffi::OsStr, fs};
 
     use super::*;
-
-    fn batch<'a>(list: &'a List, out: &Path, program: &str) -> Batch<'a> {
-        fs::create_dir_all(out.join("output")).unwrap();
-        Batch {
-            program: program.into(),
-            list,
-            drives: list.drives.clone(),
-            settings: Settings {
-                configuration: Some("/all.toml".into()),
-                set: vec!["raster.n=127".to_owned()],
-            },
-            out: out.to_owned(),
-            jobs: 1,
-        }
-    }
 
     fn list(folder: &Path, text: &str) -> List {
         let path = folder.join("list.csv");
@@ -246,9 +163,13 @@ mod tests {
     fn a_drive_is_a_run_with_its_configuration_or_that_of_the_batch() {
         let folder = tempfile::tempdir().unwrap();
         let text = "drive,configuration,set\n/a,,\n/b,/own.toml,raster.n=63\n/c.toml,,\n";
-        let list = list(folder.path(), text);
-        let batch = batch(&list, folder.path(), "gyre");
-        let of = |index: usize| words(&batch, &list.drives[index])[3..].to_vec();
+        let set = ["raster.n=127".to_owned()];
+        let list = list(folder.path(), text).with(Some(Path::new("/all.toml")), &set);
+        let of = |index: usize| {
+            let command = command(&list, folder.path(), &list.drives[index]);
+            let words: Vec<_> = command.get_args().map(OsStr::to_owned).collect();
+            words[4..].to_vec()
+        };
         assert_eq!(of(0), ["/all.toml", "/a", "--set=raster.n=127"]);
         let own = ["/own.toml", "/b", "--set=raster.n=127", "--set=raster.n=63"];
         assert_eq!(of(1), own);
@@ -257,31 +178,29 @@ mod tests {
 
     /// Returns the end of a drive whose program is a shell script.
     fn end_of(script: &str) -> End {
-        use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let program = folder.path().join("program");
-        fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         let list = list(folder.path(), "a\n");
-        let batch = batch(&list, folder.path(), program.to_str().unwrap());
+        let mut program = Command::new("sh");
+        program.args(["-c", script]);
         // An earlier attempt has left its output.
-        fs::write(folder.path().join("output/a.txt"), "earlier\n").unwrap();
-        let mut child = Child::start(&batch, &list.drives[0]).unwrap();
+        let output = folder.path().join("a.txt");
+        fs::write(&output, "earlier\n").unwrap();
+        let mut child = Child::start(&list.drives[0], program, &output).unwrap();
         let status = child.process.wait().unwrap();
-        child.end(status, Path::new("/batch"), false)
+        child.end(status, false)
     }
 
     #[test]
     fn an_end_is_the_last_line_or_the_cause_of_the_death() {
-        let reported = End::of(Outcome::Corrupt, "no /batch/drives/a");
+        let reported = End::new(Outcome::Interrupted, false, "no scans");
         let json = serde_json::to_string(&reported).unwrap();
-        let corrupt = format!("echo words; echo '{json}'");
+        let interrupted = format!("echo words; echo '{json}'");
         for (script, outcome, sentence) in [
-            (&*corrupt, Outcome::Corrupt, "no drives/a"),
+            (&*interrupted, Outcome::Interrupted, "no scans"),
             ("echo some words; exit 101", Outcome::Failed, "some words"),
             ("exit 1", Outcome::Failed, "it printed nothing"),
         ] {
-            assert_eq!(end_of(script), End::of(outcome, sentence));
+            assert_eq!(end_of(script), End::new(outcome, false, sentence));
         }
         let end = end_of(&format!("echo '{json}'; kill -9 $$"));
         assert_eq!(end.outcome, Outcome::Killed);

@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    ffi::OsStr,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -14,9 +15,7 @@ use serde::{Deserialize, Serialize};
 const MAX_BYTES: u64 = 1 << 28;
 /// The longest name, bytes: files are named after it.
 const MAX_NAME: usize = 200;
-/// The column that makes a first line a header.
-const DRIVE: &str = "drive";
-const COLUMNS: [&str; 4] = [DRIVE, "name", "configuration", "set"];
+const COLUMNS: [&str; 4] = ["drive", "name", "configuration", "set"];
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -26,10 +25,11 @@ pub struct Drive {
     /// Path of a recording's folder, of a recorded run (`.mcap`) or of a configuration (`.toml`),
     /// as the list has it.
     pub path: String,
-    /// Path of the configuration, as the list has it; `None`: the configuration of the batch.
+    /// Path of the configuration, as the list or the command has it; `None`: by the recording's
+    /// format and scans.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub configuration: Option<String>,
-    /// Overrides of the configuration, `section.key=value`.
+    pub configuration: Option<PathBuf>,
+    /// Overrides of the configuration, `section.key=value`; of two for one key the later one holds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set: Vec<String>,
 }
@@ -42,32 +42,31 @@ pub struct List {
     folder: PathBuf,
 }
 
-/// The drives of a list, or their faults, with the numbers of their lines.
-type Lines = Vec<(u64, Result<Drive, String>)>;
+/// The lines that name drives: their numbers, and their cells in the order of the columns.
+type Lines = Vec<(u64, [String; 4])>;
 
 impl List {
     /// Reads a list. Relative paths in it are relative to its folder.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let shown = path.display();
         let unread = |error: io::Error| format!("cannot read the list of drives {shown}: {error}");
-        let absolute = path.canonicalize().map_err(unread)?;
-        let (lines, folder) = match absolute.is_dir() {
+        let refused = |line: u64, reason: String| format!("{shown}, line {line}: {reason}");
+        let mut folder = path.canonicalize().map_err(unread)?;
+        let lines = match folder.is_dir() {
             // Sub-folders of a drive are not drives.
-            true if is_dataset(&absolute) => (Lines::new(), absolute),
-            true => (entries(path).map_err(unread)?, absolute),
+            true if is_dataset(&folder) => Lines::new(),
+            true => entries(&folder).map_err(unread)?,
             false => {
+                folder.pop();
                 let text = gyre_storage::read_text(path, MAX_BYTES).map_err(unread)?;
-                let folder = absolute.parent().unwrap_or(Path::new("/"));
-                (lines(&text), folder.to_owned())
+                lines(&text).map_err(|(line, reason)| refused(line, reason))?
             }
         };
         let (mut drives, mut seen) = (Vec::new(), BTreeMap::new());
-        for (line, drive) in lines {
-            let refused = |reason| format!("{shown}, line {line}: {reason}");
-            let drive = drive.map_err(refused)?;
-            if let Some(first) = seen.insert(drive.name.clone(), line) {
-                let name = drive.name;
-                return Err(refused(format!("the drive of line {first} is named `{name}` too: give them different names in the column `name`")).into());
+        for (number, line) in lines {
+            let drive = drive(line).map_err(|reason| refused(number, reason))?;
+            if let Some(first) = seen.insert(drive.name.clone(), number) {
+                return Err(refused(number, format!("the drive of line {first} is named `{}` too: give them different names in the column `name`", drive.name)).into());
             }
             drives.push(drive);
         }
@@ -75,6 +74,17 @@ impl List {
             false => Ok(Self { drives, folder }),
             true => Err(format!("{shown} names no drive: give a line for each, the path of its recording, or a folder whose sub-folders are recordings; `gyre run` computes one").into()),
         }
+    }
+
+    /// Gives all drives a configuration and overrides; those of a drive have precedence.
+    pub fn with(mut self, configuration: Option<&Path>, set: &[String]) -> Self {
+        for drive in &mut self.drives {
+            if drive.configuration.is_none() && !ends_in(&drive.path, "toml") {
+                drive.configuration = configuration.map(Path::to_owned);
+            }
+            drive.set = [set, drive.set.as_slice()].concat();
+        }
+        self
     }
 
     /// Returns the drives of a task, counted from 0, of so many: each `tasks`-th drive, so that
@@ -91,136 +101,101 @@ impl List {
         Ok(drives.cloned().collect())
     }
 
-    pub fn resolve(&self, path: &str) -> PathBuf {
+    pub fn resolve(&self, path: impl AsRef<Path>) -> PathBuf {
         self.folder.join(path)
     }
 }
 
 /// Returns the sub-folders of a folder, and the recorded runs in it, by name.
 fn entries(folder: &Path) -> io::Result<Lines> {
-    let entries: io::Result<Vec<_>> = fs::read_dir(folder)?.collect();
-    let entries = entries?.into_iter();
-    let drives = entries.filter(|entry| is_drive(&entry.path()));
-    let mut names: Vec<_> = drives.map(|entry| entry.file_name()).collect();
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        // macOS adds files of its own to an archive.
+        let is_hidden = name.starts_with('.') || name == "__MACOSX";
+        if !is_hidden && (path.is_dir() || ends_in(&path, "mcap")) {
+            names.push(name.into_owned());
+        }
+    }
     names.sort();
-    let drive = |name: std::ffi::OsString| match name.to_str() {
-        Some(name) => Drive::of(name, None),
-        None => Err(format!("the name {name:?} is not UTF-8")),
-    };
-    Ok((1..).zip(names.into_iter().map(drive)).collect())
+    Ok((1..).zip(names.into_iter().map(cells)).collect())
 }
 
-fn is_drive(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().as_encoded_bytes();
-    // macOS adds files of its own to an archive.
-    !name.starts_with(b".") && name != b"__MACOSX" && (path.is_dir() || is_recorded(path))
+/// Returns the cells of a line that is a path.
+fn cells(path: String) -> [String; 4] {
+    [path, String::new(), String::new(), String::new()]
 }
 
-fn is_recorded(path: &Path) -> bool {
-    path.extension().is_some_and(|it| it == "mcap")
-}
-
-fn lines(text: &str) -> Lines {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+/// The error is the number of a line, and its fault.
+fn lines(text: &str) -> Result<Lines, (u64, String)> {
     let lines = (1..).zip(text.lines().map(str::trim));
     let lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let is_header = |line: &str| line.split(',').any(|column| column.trim() == DRIVE);
+    let is_header = |line: &str| line.split(',').any(|column| column.trim() == "drive");
     match lines.clone().next() {
         Some((_, first)) if is_header(first) => table(text),
-        _ => lines
-            .map(|(line, path)| (line, Drive::of(path, None)))
-            .collect(),
+        _ => Ok(lines
+            .map(|(line, path)| (line, cells(path.to_owned())))
+            .collect()),
     }
 }
 
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Line {
-    drive: String,
-    name: Option<String>,
-    configuration: Option<String>,
-    set: String,
-}
-
-fn table(text: &str) -> Lines {
+fn table(text: &str) -> Result<Lines, (u64, String)> {
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
-    let header = match reader.headers() {
-        Ok(header) => header.clone(),
-        Err(error) => return vec![(1, Err(error.to_string()))],
+    let fault = |error: csv::Error| {
+        let line = error.position().map_or(1, csv::Position::line);
+        (line, error.to_string())
     };
+    let header = reader.headers().map_err(fault)?.clone();
     if let Some(column) = header.iter().find(|it| !COLUMNS.contains(it)) {
         let known = COLUMNS.join(", ");
         let unknown = format!("there is no column `{column}`; there are {known}");
-        return vec![(1, Err(unknown))];
+        return Err((1, unknown));
     }
-    let drive = |record: csv::Result<csv::StringRecord>| {
-        let position = match &record {
-            Ok(record) => record.position(),
-            Err(error) => error.position(),
-        };
-        let line = position.map_or(0, csv::Position::line);
-        let read = record.and_then(|record| record.deserialize::<Line>(Some(&header)));
-        let drive = read.map_err(|error| error.to_string());
-        (line, drive.and_then(Line::drive))
+    let places = COLUMNS.map(|column| header.iter().position(|it| it == column));
+    let mut lines = Lines::new();
+    for record in reader.records() {
+        let record = record.map_err(fault)?;
+        let line = record.position().map_or(1, csv::Position::line);
+        let cell = |place: Option<usize>| place.and_then(|place| record.get(place));
+        lines.push((line, places.map(|it| cell(it).unwrap_or("").to_owned())));
+    }
+    Ok(lines)
+}
+
+fn ends_in(path: impl AsRef<Path>, extension: &str) -> bool {
+    path.as_ref().extension().is_some_and(|it| it == extension)
+}
+
+/// Returns the drive of a line, named after its path unless the line names it.
+fn drive([path, name, configuration, set]: [String; 4]) -> Result<Drive, String> {
+    if path.is_empty() {
+        return Err("the column `drive` is empty: it is the path of the recording".to_owned());
+    }
+    let name = match ends_in(&path, "mcap") || ends_in(&path, "toml") {
+        _ if !name.is_empty() => Some(OsStr::new(&name)),
+        true => Path::new(&path).file_stem(),
+        false => Path::new(&path).file_name(),
     };
-    reader.into_records().map(drive).collect()
-}
-
-impl Line {
-    fn drive(self) -> Result<Drive, String> {
-        let (path, set) = (&self.drive, &self.set);
-        if path.is_empty() {
-            return Err("the column `drive` is empty: it is the path of the recording".to_owned());
-        }
-        if self.configuration.is_some() && is_configuration(path) {
-            return Err(format!(
-                "`{path}` is a configuration itself: leave its column `configuration` empty"
-            ));
-        }
-        let unclosed = || format!("the column `set` is `{set}`, with a quote that is not closed");
-        Ok(Drive {
-            set: shlex::split(set).ok_or_else(unclosed)?,
-            configuration: self.configuration.clone(),
-            ..Drive::of(path, self.name.as_deref())?
-        })
+    let none = || format!("`{path}` has no name: give one in the column `name`");
+    let name = name.and_then(OsStr::to_str).ok_or_else(none)?.to_owned();
+    let is_special = |c: char| c == '/' || c.is_control();
+    if name.starts_with('.') || name.len() > MAX_NAME || name.contains(is_special) {
+        return Err(format!(
+            "`{name}` cannot be the name of a drive: files are named after it, so it begins with no dot, has no slash and at most \
+             {MAX_NAME} bytes; give a different name in the column `name`"
+        ));
     }
-}
-
-/// Returns whether a drive is a configuration, of a simulation for instance.
-pub(crate) fn is_configuration(path: &str) -> bool {
-    Path::new(path).extension().is_some_and(|it| it == "toml")
-}
-
-impl Drive {
-    /// Returns a drive by its path, and by that its name unless it has its own.
-    fn of(path: &str, name: Option<&str>) -> Result<Self, String> {
-        let of_path = Path::new(path);
-        let last = match is_recorded(of_path) || is_configuration(path) {
-            true => of_path.file_stem(),
-            false => of_path.file_name(),
-        };
-        let none = || format!("`{path}` has no name: give one in the column `name`");
-        let name = name
-            .or(last.and_then(|last| last.to_str()))
-            .ok_or_else(none)?;
-        let is_plain = |c: char| c != '/' && !c.is_control();
-        let is_valid = !name.starts_with('.') && (1..=MAX_NAME).contains(&name.len());
-        match is_valid && name.chars().all(is_plain) {
-            true => Ok(Self {
-                name: name.to_owned(),
-                path: path.to_owned(),
-                configuration: None,
-                set: Vec::new(),
-            }),
-            false => Err(format!(
-                "`{name}` cannot be the name of a drive: files are named after it, so it begins with no dot, has no slash and at most \
-                 {MAX_NAME} bytes; give a different name in the column `name`"
-            )),
-        }
-    }
+    let unclosed = || format!("the column `set` is `{set}`, with a quote that is not closed");
+    Ok(Drive {
+        configuration: (!configuration.is_empty()).then(|| configuration.into()),
+        set: shlex::split(&set).ok_or_else(unclosed)?,
+        name,
+        path,
+    })
 }
 
 #[cfg(test)]

@@ -1,19 +1,17 @@
 //! The end of a drive, and its row: `rows/NAME.json`. The rows are the table.
 
 use std::{
-    fmt, io,
+    fmt,
     path::{Path, PathBuf},
 };
 
+use gyre_results::HARDLY_MEASURED;
 use gyre_run::COMPLETE;
 use gyre_terminal::Failure;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::batch::{
-    Drive,
-    figures::{self, Values},
-};
+use crate::batch::{Drive, table};
 
 /// The outcome of a drive: the column `outcome` of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -49,90 +47,63 @@ impl fmt::Display for Outcome {
 /// The end of a drive's process: the last line that it prints, as JSON.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct End {
+    /// `Complete` if all scans were played, whatever their results are worth.
     pub outcome: Outcome,
-    /// True if the drive had ended so before.
+    /// True if earlier results of the drive still count: they are the same, or nobody could look.
     pub earlier: bool,
-    /// True if the drive was not looked at: its earlier results still count.
-    pub unchecked: bool,
     /// The reason why it is not complete; else empty.
     pub sentence: String,
 }
 
 impl End {
-    pub fn of(outcome: Outcome, sentence: impl Into<String>) -> Self {
+    pub fn new(outcome: Outcome, earlier: bool, sentence: impl Into<String>) -> Self {
         Self {
             outcome,
-            earlier: false,
-            unchecked: false,
+            earlier,
             sentence: sentence.into(),
-        }
-    }
-
-    /// Returns the end of a drive whose recording or folder could not be looked at.
-    pub fn unchecked(sentence: impl Into<String>) -> Self {
-        Self {
-            unchecked: true,
-            ..Self::of(Outcome::Failed, sentence)
         }
     }
 
     pub fn interrupted() -> Self {
         let sentence = "the batch was interrupted: the same command continues";
-        Self {
-            outcome: Outcome::Interrupted,
-            ..Self::unchecked(sentence)
-        }
+        Self::new(Outcome::Interrupted, true, sentence)
     }
-}
-
-/// The settings that the drives of a batch have in common.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// The configuration of drives without a configuration, an absolute path; `None`: by their
-    /// formats and scans.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub configuration: Option<PathBuf>,
-    /// Overrides of each configuration, `section.key=value`. Overrides of a drive have precedence.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub set: Vec<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
     pub drive: Drive,
-    pub settings: Settings,
     pub outcome: Outcome,
     /// The reason why it is not complete, in a sentence; else empty.
     pub sentence: String,
     /// The values of both tables by column; empty unless all scans were played.
-    pub values: Values,
+    pub values: table::Values,
 }
 
 impl Row {
     /// The row of a drive that has ended in the folder of a batch.
-    pub fn of(
-        batch: &Path,
-        drive: &Drive,
-        settings: &Settings,
-        outcome: Outcome,
-        sentence: impl Into<String>,
-    ) -> Self {
-        let mut row = Self {
-            drive: drive.clone(),
-            settings: settings.clone(),
-            outcome,
-            sentence: sentence.into(),
-            values: Values::new(),
+    pub fn of(batch: &Path, drive: &Drive, outcome: Outcome, sentence: impl Into<String>) -> Self {
+        let (values, problem) = match outcome {
+            Outcome::Complete => match table::values(&Self::results(batch, drive)) {
+                Ok(read) => read,
+                Err(error) => return Self::of(batch, drive, Outcome::Failed, error),
+            },
+            _ => (table::Values::new(), None),
         };
-        if outcome.has_results() {
-            match figures::read(&Self::results(batch, drive)) {
-                Ok(values) => row.values = values,
-                Err(error) => (row.outcome, row.sentence) = (Outcome::Failed, error.to_string()),
-            }
+        let outcome = match &problem {
+            None => outcome,
+            Some(problem) if problem.contains(HARDLY_MEASURED) => Outcome::Unsure,
+            Some(_) => Outcome::Corrupt,
+        };
+        let sentence = problem.unwrap_or_else(|| sentence.into());
+        Self {
+            drive: drive.clone(),
+            outcome,
+            // Without the place of the batch the table is the same in each place.
+            sentence: sentence.replace(&format!("{}/", batch.display()), ""),
+            values,
         }
-        row
     }
 
     pub fn results(batch: &Path, drive: &Drive) -> PathBuf {
@@ -151,29 +122,20 @@ impl Row {
 
     /// Reads the row of a drive with these settings, whose results are there if it had any. Without
     /// one the outcome is `not-run`.
-    pub fn read(batch: &Path, drive: &Drive, settings: &Settings) -> Result<Self, Failure> {
-        let not_run = |sentence: &str| Self::of(batch, drive, settings, Outcome::NotRun, sentence);
+    pub fn read(batch: &Path, drive: &Drive) -> Self {
         let path = Self::path(batch, drive);
-        let text = match gyre_storage::read_text(&path, gyre_storage::SETTINGS) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                return Ok(not_run("it has not been computed yet"));
-            }
-            Err(error) => return Err(format!("cannot read {}: {error}", path.display()).into()),
-        };
-        let row: Self = match serde_json::from_str(&text) {
-            Ok(row) => row,
-            Err(error) => return Ok(not_run(&figures::unknown(&path, error))),
-        };
-        if (&row.drive, &row.settings) != (drive, settings) {
-            return Ok(not_run("it was computed with other settings"));
-        }
-        // A run that begins removes the results before it.
         let has_results = || Self::results(batch, drive).join(COMPLETE).exists();
-        Ok(match row.outcome.has_results() && !has_results() {
-            true => not_run("its results are being computed again, or were removed"),
-            false => row,
-        })
+        let reason = match table::read_json::<Self>(&path) {
+            _ if !path.exists() => "it has not been computed yet".to_owned(),
+            Err(reason) => reason,
+            Ok(row) if row.drive != *drive => "it was computed with other settings".to_owned(),
+            // A run that begins removes the results before it.
+            Ok(row) if row.outcome.has_results() && !has_results() => {
+                "its results are being computed again, or were removed".to_owned()
+            }
+            Ok(row) => return row,
+        };
+        Self::of(batch, drive, Outcome::NotRun, reason)
     }
 
     /// Returns a line about it; `earlier`: the drive had ended so before.

@@ -1,66 +1,156 @@
-//! The table of a batch: `results.csv` and, drive by drive in the same order, `times.csv`.
+//! The table of a batch: `results.csv` and, drive by drive in the same order, `times.csv`; the
+//! columns, and the places of their values in a run's `summary.json`.
 
-use std::path::Path;
+use std::{collections::BTreeMap, fmt::Display, path::Path};
 
+use gyre_datasets::ground_truth::read_trajectory;
+use gyre_evaluation::path_m;
+use gyre_storage::{SETTINGS, read_text};
 use gyre_terminal::Failure;
-use serde_json::Value;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 
-use crate::batch::{
-    List, Row, Settings,
-    figures::{Column, FIGURES, TIMES},
-};
+use crate::batch::Row;
 
 /// The file of the results that follow from the drives and their configurations: the same bytes
 /// whatever was killed.
 pub const RESULTS: &str = "results.csv";
 pub const TIMES_FILE: &str = "times.csv";
 
-/// Writes both files from the rows of all drives of a list, which are returned.
-pub fn write(list: &List, settings: &Settings, out: &Path) -> Result<Vec<Row>, Failure> {
-    if !out.join("rows").is_dir() {
-        let out = out.display();
-        return Err(format!(
-            "{out} is not the folder of a batch: no drive has been computed there"
-        )
-        .into());
-    }
-    let drives = list.drives.iter();
-    let rows = drives.map(|drive| Row::read(out, drive, settings));
-    let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
-    let head = |row: &Row| {
-        let (drive, outcome) = (&row.drive, row.outcome.to_string());
-        vec![
-            drive.name.clone(),
-            drive.path.clone(),
-            outcome,
-            row.sentence.clone(),
-        ]
+/// A column: its name, and the JSON pointer into the summary; under `/derived` is a value that
+/// [`values`] adds.
+type Column = (&'static str, &'static str);
+/// The values of a drive by column. A column without a value is left out.
+pub type Values = BTreeMap<String, Value>;
+
+/// The columns of `results.csv` after outcome and sentence. On one kind of processor the same scans
+/// and configuration give the same, whatever was killed meanwhile.
+#[rustfmt::skip]
+const FIGURES: [Column; 26] = [
+    ("version", "/version"),
+    ("build", "/derived/build"),
+    ("scans", "/scans_in_recording"),
+    ("poses", "/processed"),
+    ("dropped", "/dropped"),
+    ("unreadable", "/unreadable"),
+    ("missing", "/missing"),
+    ("breaks", "/breaks"),
+    ("duration_s", "/derived/duration_s"),
+    ("path_m", "/derived/path_m"),
+    ("refined", "/motions/refined"),
+    ("weak", "/motions/weak"),
+    ("predicted", "/motions/predicted"),
+    ("stationary", "/motions/stationary"),
+    ("truth_path_m", "/evaluation/path_m"),
+    ("ate_rmse_m", "/evaluation/ate/rmse_m"),
+    ("ate_max_m", "/evaluation/ate/max_m"),
+    ("kitti_translation_percent", "/evaluation/kitti/translation_percent"),
+    ("kitti_rotation_deg_per_100m", "/evaluation/kitti/rotation_deg_per_100m"),
+    ("seg_percent", "/evaluation/seg/percent"),
+    ("rpe_translation_rmse_m", "/evaluation/rpe/translation_rmse_m"),
+    ("rpe_rotation_rmse_deg", "/evaluation/rpe/rotation_rmse_deg"),
+    ("keyframes", "/slam/keyframes"),
+    ("loops_used", "/slam/loops_used"),
+    ("loops_rejected", "/slam/loops_rejected"),
+    ("slam_ate_rmse_m", "/slam/ate_m"),
+];
+/// The columns of `times.csv`: they depend on the computer and on kills.
+const TIMES: [Column; 9] = [
+    ("processor", "/machine/processor"),
+    ("cores", "/machine/cores"),
+    ("resumed_after", "/resumed_after"),
+    ("wall_s", "/wall_s"),
+    ("scans_per_s", "/scans_per_s"),
+    ("restarts", "/derived/restarts"),
+    ("sensor_to_pose_p50_ms", "/derived/p50_ms"),
+    ("sensor_to_pose_p99_ms", "/derived/p99_ms"),
+    ("bound_by", "/latency/bound_by"),
+];
+
+/// Reads the figures of a run that has played all scans, and why they are unreliable, if they are.
+pub(crate) fn values(out: &Path) -> Result<(Values, Option<String>), String> {
+    let path = out.join("summary.json");
+    let mut summary = read_json(&path).map(Value::Object)?;
+    let problem = summary["problem"].as_str().map(str::to_owned);
+    let ms = |percentile| Some(summary.pointer(percentile)?.as_f64()? * 1e-3);
+    let restarts = summary["restarts"].as_object().into_iter().flatten();
+    let restarts: u64 = restarts.filter_map(|(_, count)| count.as_u64()).sum();
+    let trajectory = read_trajectory(&out.join("trajectory.tum")).ok();
+    let trajectory = trajectory.filter(|it| it.poses.len() > 1);
+    let span_ns = trajectory.as_ref().and_then(|it| it.span_ns());
+    let begun = read_text(&out.join(gyre_run::BEGUN_WITH), SETTINGS).ok();
+    let begun: Option<toml::Table> = begun.and_then(|text| text.parse().ok());
+    let build = |begun: &toml::Table| {
+        let build = begun.get("programs")?.get("build")?.as_str()?;
+        // So many digits distinguish it.
+        Some(build.get(..12)?.to_owned())
     };
-    let names = ["name", "drive", "outcome", "sentence"];
-    gyre_storage::write(&out.join(RESULTS), csv(&rows, &names, head, &FIGURES)?)?;
-    let head = |row: &Row| vec![row.drive.name.clone()];
-    gyre_storage::write(&out.join(TIMES_FILE), csv(&rows, &["name"], head, &TIMES)?)?;
-    Ok(rows)
+    summary["derived"] = json!({
+        "build": begun.as_ref().and_then(build),
+        "restarts": restarts,
+        "p50_ms": ms("/latency/sensor_to_pose/p50_us"),
+        "p99_ms": ms("/latency/sensor_to_pose/p99_us"),
+        "duration_s": span_ns.map(|(first, last)| (last - first) as f64 * 1e-9),
+        "path_m": trajectory.map(|it| path_m(&it.poses)),
+    });
+    let mut values = Values::new();
+    for (name, pointer) in FIGURES.iter().chain(&TIMES) {
+        let value = match summary.pointer(pointer) {
+            None | Some(Value::Null) => continue,
+            // Rounded to a hundred-thousandth, which is finer than any figure is exact.
+            Some(Value::Number(number)) if number.is_f64() => {
+                ((number.as_f64().unwrap_or_default() * 1e5).round() / 1e5).into()
+            }
+            Some(value @ (Value::String(_) | Value::Number(_))) => value.clone(),
+            Some(_) => return Err(unknown(&path, format!("`{pointer}` is no figure"))),
+        };
+        values.insert((*name).to_owned(), value);
+    }
+    Ok((values, problem))
 }
 
-/// Returns a table: of each row the first cells, then its values.
-fn csv(
-    rows: &[Row],
-    names: &[&str],
-    head: fn(&Row) -> Vec<String>,
-    columns: &[Column],
-) -> Result<Vec<u8>, Failure> {
+/// Reads a file that a batch or a run has written. The error is a sentence.
+pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
+    let text = read_text(path, SETTINGS);
+    let text = text.map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    serde_json::from_str(&text).map_err(|error| unknown(path, error))
+}
+
+fn unknown(path: &Path, reason: impl Display) -> String {
+    let path = path.display();
+    format!(
+        "{path} is not what this version of gyre writes ({reason}); remove it, and the same command makes it again"
+    )
+}
+
+/// Writes both files from the rows of all drives.
+pub fn write(rows: &[Row], out: &Path) -> Result<(), Failure> {
+    let first = ["name", "drive", "outcome", "sentence"];
+    gyre_storage::write(&out.join(RESULTS), csv(rows, &first, &FIGURES)?)?;
+    let times = csv(rows, &["name"], &TIMES)?;
+    Ok(gyre_storage::write(&out.join(TIMES_FILE), times)?)
+}
+
+fn csv(rows: &[Row], first: &[&str], columns: &[Column]) -> Result<Vec<u8>, Failure> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(names.iter().copied().chain(columns.iter().map(|it| it.0)))?;
+    let names = first.iter().copied().chain(columns.iter().map(|it| it.0));
+    writer.write_record(names.clone())?;
     for row in rows {
-        let values = columns.iter().map(|(name, _)| match row.values.get(*name) {
-            None => String::new(),
-            Some(Value::String(text)) => text.clone(),
-            Some(other) => other.to_string(),
-        });
-        writer.write_record(head(row).into_iter().chain(values))?;
+        writer.write_record(names.clone().map(|name| cell(row, name)))?;
     }
     Ok(writer.into_inner()?)
+}
+
+fn cell(row: &Row, column: &str) -> String {
+    match (column, row.values.get(column)) {
+        ("name", _) => row.drive.name.clone(),
+        ("drive", _) => row.drive.path.clone(),
+        ("outcome", _) => row.outcome.to_string(),
+        ("sentence", _) => row.sentence.clone(),
+        (_, None) => String::new(),
+        (_, Some(Value::String(text))) => text.clone(),
+        (_, Some(other)) => other.to_string(),
+    }
 }
 
 #[cfg(test)]
@@ -69,7 +159,49 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::batch::Outcome;
+    use crate::batch::{List, Outcome};
+
+    const SUMMARY: &str = r#"{
+        "version": "0.1.0", "machine": {"processor": "CPU", "cores": 2}, "scans_in_recording": 3, "resumed_after": 1,
+        "published": 3, "processed": 3, "dropped": 0, "unreadable": 0, "missing": 0, "breaks": 0,
+        "wall_s": 0.5, "scans_per_s": 4.0, "restarts": {"masking": 2, "refinement": 1},
+        "latency": {"sensor_to_pose": {"p50_us": 1500.0, "p99_us": 2500.0}, "bound_by": "masking"},
+        "evaluation": {"path_m": 2.0, "ate": {"rmse_m": 0.1234567, "max_m": 0.2}, "kitti": null, "seg": null, "rpe": null}
+    }"#;
+
+    fn run(summary: &str) -> tempfile::TempDir {
+        let out = tempfile::tempdir().unwrap();
+        fs::write(out.path().join("summary.json"), summary).unwrap();
+        let poses = "10.0 0 0 0 0 0 0 1\n10.25 1 0 0 0 0 0 1\n10.5 1 2 0 0 0 0 1\n";
+        fs::write(out.path().join("trajectory.tum"), poses).unwrap();
+        out
+    }
+
+    #[test]
+    fn values_are_those_of_the_run_and_its_trajectory() {
+        let (values, problem) = values(run(SUMMARY).path()).unwrap();
+        assert_eq!(problem, None);
+        assert_eq!(values["duration_s"], 0.5);
+        assert_eq!(values["path_m"], 3.0);
+        assert_eq!(values["ate_rmse_m"], 0.12346);
+        assert_eq!(values.get("kitti_translation_percent"), None);
+        assert_eq!(values.get("loops_used"), None);
+        assert_eq!(values["restarts"], 3);
+        assert_eq!(values["scans_per_s"], 4.0);
+        assert_eq!(values["sensor_to_pose_p99_ms"], 2.5);
+    }
+
+    #[test]
+    fn a_run_of_one_pose_has_no_path_and_an_invalid_summary_is_refused() {
+        let out = run(&SUMMARY.replace("\"processed\": 3", "\"processed\": 1"));
+        fs::remove_file(out.path().join("trajectory.tum")).unwrap();
+        let (of_one, _) = values(out.path()).unwrap();
+        assert_eq!((&of_one["poses"], of_one.get("path_m")), (&json!(1), None));
+        for summary in ["{\"processed\": []}", "[]", "3"] {
+            let error = values(run(summary).path()).unwrap_err();
+            assert!(error.contains("summary.json is not what"), "{error}");
+        }
+    }
 
     #[test]
     fn the_table_has_a_line_for_each_drive_and_a_damaged_row_counts_as_not_run() {
@@ -78,15 +210,18 @@ mod tests {
         fs::write(&path, "b\na\nc\n").unwrap();
         let list = List::read(&path).unwrap();
         fs::create_dir(out.join("rows")).unwrap();
-        let settings = Settings::default();
-        let mut row = Row::of(out, &list.drives[1], &settings, Outcome::NotRun, "");
+        let log = out.join("drives/a/log.jsonl");
+        let sentence = format!("no {}", log.display());
+        let mut row = Row::of(out, &list.drives[1], Outcome::NotRun, sentence);
+        assert_eq!(row.sentence, "no drives/a/log.jsonl");
         row.outcome = Outcome::Complete;
         row.values.insert("ate_rmse_m".to_owned(), 0.25.into());
         row.write(out).unwrap();
         fs::create_dir_all(out.join("drives/a/journal")).unwrap();
         fs::write(out.join("drives/a/journal/complete"), "").unwrap();
         fs::write(out.join("rows/c.json"), "{").unwrap();
-        let rows = write(&list, &settings, out).unwrap();
+        let rows: Vec<_> = list.drives.iter().map(|it| Row::read(out, it)).collect();
+        write(&rows, out).unwrap();
         assert_eq!(rows[1], row);
         let damaged = rows[2].line(false);
         assert!(damaged.starts_with("c: not-run") && damaged.contains("c.json is not what"));
