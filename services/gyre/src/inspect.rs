@@ -38,7 +38,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
         gyre_datasets::inspect_dataset(&path, dataset, &options, &logs, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
-        false => print::line(report)?,
+        false => print::values(report)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -29,7 +29,7 @@ pub fn doctor(footprint: &Footprint) -> Result<ExitCode, Failure> {
         let state = if remedy.is_some() { lack } else { "ok" };
         let remedy = remedy.map(|remedy| format!("\n{:21}-> {remedy}", ""));
         let remedy = remedy.unwrap_or_default();
-        print::line(format_args!("{state:<6}{subject:<15}{found}{remedy}"))?;
+        print::values(format_args!("{state:<6}{subject:<15}{found}{remedy}"))?;
     }
     print::line(match works {
         true => "a run works here; `gyre demo` tries it",

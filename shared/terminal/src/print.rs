@@ -5,11 +5,22 @@ use std::{
     io::{self, IsTerminal, Write},
 };
 
-use crate::{Failure, WIDTH, wrap};
+use crate::{
+    Failure,
+    wrap::{WIDTH, wrap, wrap_values},
+};
 
 /// Prints a line to standard output. A closed pipe (`gyre inspect ... | head`) is not an error.
 pub fn line(text: impl Display) -> Result<(), Failure> {
     printed(writeln!(io::stdout(), "{text}"))
+}
+
+/// Prints lines of names and values, on a terminal so that they fit it.
+pub fn values(text: impl Display) -> Result<(), Failure> {
+    match io::stdout().is_terminal() {
+        true => line(wrap_values(&text.to_string(), WIDTH).join("\n")),
+        false => line(text),
+    }
 }
 
 pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
