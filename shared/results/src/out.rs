@@ -151,12 +151,20 @@ pub enum OutError {
 #[derive(Debug)]
 pub struct Out {
     path: PathBuf,
-    _lock: File,
+    lock: File,
 }
 
 /// Returns the full name of a folder of results, which need not exist yet.
 pub fn absolute(out: &Path) -> io::Result<PathBuf> {
     out.canonicalize().or_else(|_| std::path::absolute(out))
+}
+
+/// A process that is being started has the file too until it executes its program, so that closing
+/// it here would not end the lock.
+impl Drop for Out {
+    fn drop(&mut self) {
+        let _ = self.lock.unlock();
+    }
 }
 
 impl Out {
@@ -175,7 +183,7 @@ impl Out {
                 if owner(&path).is_none() {
                     lock.write_all(content.0.as_bytes()).map_err(&unwritable)?;
                 }
-                Ok(Self { path, _lock: lock })
+                Ok(Self { path, lock })
             }
             Attempt::Held(holder) => {
                 let holder = holder.map_or(String::new(), |holder| format!(", {holder}"));
