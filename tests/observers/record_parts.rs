@@ -1,4 +1,4 @@
-//! Parts of a recording that ends a file by its size or its time: each is read by itself, and each
+//! Parts of a recording that ends a file by its size or its time: each is read alone, and each
 //! message is in one of them.
 
 use std::{fs, path::PathBuf, slice};
@@ -8,7 +8,7 @@ use gyre_recording::{Recording, parts};
 use super::record::{ALL, file, played, recorded, seqs};
 use crate::common::{gyre, recording::SCANS, undisturbed};
 
-/// Reads each part by itself; returns the numbers of the messages of a topic, part by part.
+/// Reads each part alone; returns the numbers of the messages of a topic, part by part.
 fn seqs_in(parts: &[PathBuf], topic: &str) -> Vec<u64> {
     let mut all = Vec::new();
     for part in parts {

@@ -1,4 +1,4 @@
-//! The arguments that several commands have, and those of commands that a build may lack.
+//! The arguments that several commands share, and the arguments of optional commands.
 
 mod link;
 mod ros2;

@@ -156,7 +156,7 @@ impl Earlier {
     }
 }
 
-/// States of a run that another one does not replace.
+/// States of a run that a different run does not replace.
 const UNFINISHED: &str = "an unfinished";
 const COMPLETED: &str = "a complete";
 

@@ -99,7 +99,7 @@ impl Identity {
         Self::read_file(&path).map_err(|state| {
             let path = path.display();
             format!(
-                "{path} {state}: it says what the run there was computed from; restore it from a backup, choose another --out, or \
+                "{path} {state}: it names the inputs of the run there; restore it from a backup, choose another --out, or \
                  discard the run with --fresh"
             )
             .into()
@@ -127,8 +127,8 @@ impl Identity {
         }
     }
 
-    /// Checks that the run was of this configuration and of these programs; the error names what is
-    /// another.
+    /// Checks that the run was of this configuration and of these programs; the error names the
+    /// difference.
     pub fn require(&self, now: &Configuration, programs: &Programs) -> Result<(), Failure> {
         if let Some(difference) = now.difference(&self.configuration)? {
             return Err(format!("another configuration ({difference})").into());
@@ -138,7 +138,7 @@ impl Identity {
     }
 
     /// Checks that the recording is the one that the run was begun with, and is read in the same
-    /// way; the error names what is another.
+    /// way; the error names the difference.
     pub fn require_recording(&self, now: &Self) -> Result<(), Failure> {
         let options = |of: &Self| toml::Table::try_from(of.dataset);
         if let Some(difference) = difference::first(&options(self)?, &options(now)?) {

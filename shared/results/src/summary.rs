@@ -65,7 +65,7 @@ fn problem(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Op
         return None;
     } else if poses < 2 {
         format!(
-            "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
+            "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} has the reasons"
         )
     } else if let Some(damage) = session.damage {
         let missing = counts.missing;
@@ -74,7 +74,7 @@ fn problem(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Op
         )
     } else if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
         format!(
-            "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
+            "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} has the reason for each"
         )
     } else {
         let it = counts.too_many_are_unsure()?;

@@ -264,7 +264,7 @@ impl Base<'_> {
             Err(_) => StartAnswer::Refused(other_version("the base").to_string()),
             Ok(Some(difference)) => StartAnswer::Refused(difference),
             Ok(None) if is_other => StartAnswer::Refused(
-                "the base has poses of a different drive: begin both anew with --fresh".to_owned(),
+                "the base has poses of a different drive: start both again with --fresh".to_owned(),
             ),
             Ok(None) if another_is_there => StartAnswer::Wait(
                 "another robot is on this link, or was a moment ago: each has a name of its own (link.name)".to_owned(),
@@ -326,7 +326,7 @@ impl Base<'_> {
         let follows = is_whole && item.seq == self.next();
         if !begins && !follows {
             return Err(StageError::Input(format!(
-                "the robot sends item {}, but this run needs {}, which the robot no longer has: begin both anew with --fresh",
+                "the robot sends item {}, but this run needs {}, which the robot no longer has: start both again with --fresh",
                 item.seq,
                 self.next()
             )));
@@ -334,7 +334,7 @@ impl Base<'_> {
         let is_resumed = self.resumed_at() == Some(item.seq);
         match is_resumed && item.stamp_ns != self.resumed.stamp_ns {
             true => Err(StageError::Input(format!(
-                "the robot's scan {} is not the one that this run has a pose of: it plays a different drive; begin both anew with --fresh",
+                "the robot's scan {} is not the one that this run has a pose of: it plays a different drive; start both again with --fresh",
                 item.scan
             ))),
             false => Ok(()),

@@ -139,12 +139,12 @@ impl Robot<'_> {
         let window = self.launch.manifest.window.scans as u64;
         match self.config.cut {
             _ if base < poses => Err(StageError::Input(format!(
-                "this run has {poses} poses, but the base begins at {base}: begin both anew with --fresh, or go on with the base's --out of this run"
+                "this run has {poses} poses, but the base begins at {base}: start both again with --fresh, or continue with the base's --out of this run"
             ))),
             // The local map is here, and cannot be restored from poses.
             PlayedFrom::Refined if base > poses.saturating_add(window) => {
                 Err(StageError::Input(format!(
-                    "the base has {base} poses and this run {poses}, and the local map of the refinement, which is here, cannot be made up: begin both anew with --fresh"
+                    "the base has {base} poses and this run {poses}, and the local map of the refinement, which is here, cannot be made up: start both again with --fresh"
                 )))
             }
             _ => Ok(()),

@@ -230,7 +230,7 @@ impl SentTopic<'_> {
     }
 }
 
-/// Returns the buffer of a topic. The poses are those of the run.
+/// Returns the buffer of a topic. The poses come from the run.
 fn buffer(
     name: &str,
     manifest: &Manifest,

@@ -174,7 +174,7 @@ mod tests {
         turns
     }
 
-    /// Returns the number of scans of these datagrams, and what was counted.
+    /// Returns the number of scans of these datagrams, and the counts.
     fn received(sent: &[Vec<u8>]) -> (usize, Received) {
         let mut parser = Datagrams::new(ENCODER);
         let mut intake = Intake::new(DatasetOptions::default());

@@ -77,7 +77,7 @@ pub fn compute(list: &List, out: &Path, jobs: usize) -> Result<(usize, bool), Fa
 struct Child<'a> {
     drive: &'a Drive,
     process: process::Child,
-    /// The output of this process; before it are those of earlier ones.
+    /// The output of this process; the outputs of earlier processes precede it.
     output: File,
 }
 

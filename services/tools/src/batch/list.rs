@@ -76,7 +76,7 @@ impl List {
         }
     }
 
-    /// Gives all drives a configuration and overrides; those of a drive have precedence.
+    /// Gives all drives a configuration and overrides; a drive's own have precedence.
     pub fn with(mut self, configuration: Option<&Path>, set: &[String]) -> Self {
         for drive in &mut self.drives {
             if drive.configuration.is_none() && !ends_in(&drive.path, "toml") {

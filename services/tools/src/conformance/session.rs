@@ -172,7 +172,7 @@ impl<'a> Session<'a> {
         Ok(self.ended_within(QUIET)?.is_none())
     }
 
-    /// Takes what the process has sent; returns whether there was anything.
+    /// Takes the messages that the process has sent; returns whether there were any.
     fn receive(&mut self) -> Result<bool, StageError> {
         let mut any = false;
         while let Some(sent) = self.harness.receive()? {

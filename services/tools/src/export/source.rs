@@ -36,7 +36,7 @@ pub struct Source {
     pub run: Option<Configuration>,
 }
 
-/// A pose of a run with what is known of its time.
+/// A pose of a run, and its time where it is known.
 #[derive(Clone, Debug)]
 pub struct Place {
     pub pose: PoseHeader,

@@ -130,7 +130,7 @@ pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
     let (out, poses) = (status.out.display(), status.poses);
     if !status.processes.is_empty() && version_of_results(&status.out) == before {
         return Err(format!(
-            "{out} has ended, but its results are not written; the poses are kept, and the same command continues from there. {LOG} in it says why"
+            "{out} has ended, but its results are not written; the poses are kept, and the same command continues from there. {LOG} in it has the reason"
         )
         .into());
     }

@@ -107,7 +107,7 @@ pub fn serve(
     }
 }
 
-/// Returns what a radar with these scans says about itself.
+/// Returns the configuration message of a radar with these scans.
 pub(crate) fn configuration(
     dataset: &dyn Dataset,
     geometry: &SweepGeometry,

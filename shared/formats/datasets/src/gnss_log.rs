@@ -174,7 +174,7 @@ impl GnssLog {
         }
     }
 
-    /// Examines the fixes; a log of which none can be used has the reason.
+    /// Examines the fixes; a log without a usable fix has the reason.
     fn examined(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> Self {
         let all = raw.count();
         let (fixes, plane, faults) = faults::examine(raw, is_plane);

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::LogLine;
 
-/// The most that is read at once, bytes; a longer line is none of the log.
+/// The most that is read at once, bytes; a longer line is not of the log.
 const MAX_BYTES: u64 = 1 << 20;
 
 pub struct LogTail {

@@ -132,7 +132,7 @@ fn axes(motion: &Pose) -> Matrix3<f64> {
     motion.rotation.to_rotation_matrix().to_homogeneous()
 }
 
-/// Returns ids and numbers, or what is `needed`.
+/// Returns ids and numbers; the error names `needed`.
 fn fields<'a, const IDS: usize, const NUMBERS: usize>(
     words: impl Iterator<Item = &'a str>,
     needed: &str,

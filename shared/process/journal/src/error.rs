@@ -21,7 +21,7 @@ pub enum JournalError {
     Busy(#[from] Busy),
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A file lacks what the poses of the journal need.
+    /// A file lacks records of poses in the journal.
     #[error("{0}")]
     Missing(String),
 }

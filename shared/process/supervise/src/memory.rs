@@ -24,8 +24,8 @@ fn available(meminfo: &str) -> Option<u64> {
     Some(kilobytes * 1024)
 }
 
-/// Returns what the control groups in `/proc/self/cgroup` (version 1 or 2) leave, and those above
-/// them that have a limit.
+/// Returns the memory, bytes, that the control groups in `/proc/self/cgroup` (version 1 or 2)
+/// leave, and the groups above them that have a limit.
 fn left_by_groups(root: &Path, groups: &str) -> Vec<u64> {
     let hierarchies = groups.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':').skip(1);

@@ -43,7 +43,7 @@ pub struct Read {
     pub trajectory: Trajectory,
     pub motions: Vec<TimedMotion>,
     pub corrected: Trajectory,
-    /// True if there were more poses to judge than [`MOST_JUDGED`]: none is kept.
+    /// True if there were more poses to judge than [`MOST_JUDGED`]: no pose is kept.
     pub are_too_many: bool,
     pub corrected_sketch: Sketch,
 }

@@ -182,7 +182,7 @@ impl<'a> Shadowing<'a> {
             return self.start();
         };
         let is_open = life.attend()?;
-        // Before its messages: those of a dead program are all there.
+        // Before its messages: a dead program sends no more.
         let death = life.harness.death();
         for sent in life.take()? {
             self.receive(sent)?;

@@ -85,8 +85,8 @@ impl Clients {
     }
 }
 
-/// Writes a message within [`WRITE_TIMEOUT`]. The time-out of the socket begins anew with each part
-/// that a client reads, and all other clients wait meanwhile.
+/// Writes a message within [`WRITE_TIMEOUT`]. The time-out of the socket starts again with each
+/// part that a client reads, and all other clients wait meanwhile.
 fn write_in_time(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
     let began = Instant::now();
     while !bytes.is_empty() {

@@ -15,8 +15,8 @@ const BY_TIME: &str = "The files are not named by times of their scans: they are
 const BY_NAME: &str = "The files are not named by times of their scans: they are in the order of their names, \
                        since in the order of the times of their first rows scans would overlap: a clock was set.";
 
-/// Times of the first rows, ns since 1970, increasing unless a clock was set; that of an unreadable
-/// image is estimated. And sentences on the order.
+/// Times of the first rows, ns since 1970, increasing unless a clock was set; the time of an
+/// unreadable image is estimated. And sentences on the order.
 type RowOrder = (Vec<i64>, Vec<String>);
 
 /// Orders images by the stamps of their first rows, unless that mixes two clocks, and leaves out

@@ -25,8 +25,8 @@ pub(super) fn project(poses: &[Matrix]) -> Result<Vec<[f64; 4]>, LineError> {
     }
 }
 
-/// Returns whether poses are those of a camera (z forward, y down): on a straight road it stays
-/// upright about z too.
+/// Returns whether poses are in the axes of a camera (z forward, y down): on a straight road a
+/// camera stays upright about z too.
 fn moves_along_z(poses: &[Matrix]) -> bool {
     let [x, y, z] = [3, 7, 11].map(|axis| {
         let at = || poses.iter().map(|m| m[axis]);

@@ -112,8 +112,8 @@ impl Engine {
         Self::Rten(Box::new(model), Arc::new(ThreadPool::with_num_threads(1)))
     }
 
-    /// Computes a network, and allocates nothing but what the libraries do. `take` gets the shape
-    /// and the values of its output.
+    /// Computes a network; only the libraries allocate. `take` gets the shape and the values of its
+    /// output.
     pub fn compute<T>(
         &mut self,
         shape: [usize; 4],
