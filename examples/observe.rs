@@ -14,7 +14,7 @@
 
 use std::{error::Error, path::PathBuf, time::Duration};
 
-use gyre_messages::{Pose, Scan};
+use gyre_contract::{Pose, Scan};
 use gyre_stage::observer::{Next, ObservedRun};
 
 fn main() -> Result<(), Box<dyn Error>> {

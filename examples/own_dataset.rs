@@ -2,7 +2,7 @@
 //! azimuths x 576 range bins without a header, named by the time of its middle, ns.
 //!
 //! ```sh
-//! cargo run --release -p gyre-odometry --example own_dataset -- FOLDER > trajectory.tum
+//! cargo run --release -p gyre-matching --example own_dataset -- FOLDER > trajectory.tum
 //! ```
 
 use std::{
@@ -17,7 +17,7 @@ use gyre_datasets::{
     DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, InspectedLogs, Properties,
     ReadError, inspect_dataset, turn_ns, write_tum,
 };
-use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, ScanSlot, Sense, SweepGeometry, Trajectory, scan::flag};
 
 const SIZE: ImageSize = ImageSize {

@@ -2,7 +2,7 @@
 //! translation.
 //!
 //! ```sh
-//! cargo run --release -p gyre-odometry --example own_search
+//! cargo run --release -p gyre-matching --example own_search
 //! ```
 //!
 //! Here both sensors are simulated. Yours come from drivers: `GyroscopeSearch` stays. A mask of
@@ -10,8 +10,10 @@
 
 use std::error::Error;
 
-use gyre_odometry::{Odometry, OdometryConfig, OdometryError, Pair, Parts, Registered, Search};
-use gyre_scan_matching::{JointMatch, RotationMatch, TranslationSearch};
+use gyre_matching::odometry::{
+    Odometry, OdometryConfig, OdometryError, Pair, Parts, Registered, Search,
+};
+use gyre_matching::{JointMatch, RotationMatch, TranslationSearch};
 use gyre_simulator::{SimulationConfig, Simulator};
 
 /// Time between two readings.

@@ -1,7 +1,7 @@
 //! Odometry of a radar that Gyre has no reader for: each of its sweeps is an array of powers.
 //!
 //! ```sh
-//! cargo run --release -p gyre-odometry --example own_sensor
+//! cargo run --release -p gyre-matching --example own_sensor
 //! ```
 //!
 //! Here the sweeps are computed, of a sensor that drives 2 m ahead in each. Yours come from a
@@ -9,7 +9,7 @@
 
 use std::{error::Error, f32::consts::TAU};
 
-use gyre_odometry::{Odometry, OdometryConfig, Registered};
+use gyre_matching::odometry::{Odometry, OdometryConfig, Registered};
 use gyre_radar::{PolarScan, Sense, SweepGeometry, scan::flag};
 
 const AZIMUTHS: usize = 400;

@@ -1,4 +1,4 @@
-"""The wire types of Gyre that a masking stage needs: `shared/process/messages` as ctypes structures.
+"""The wire types of Gyre that a masking stage needs: `shared/contract` as ctypes structures.
 
 The sizes are asserted, and a test of Gyre compares every offset with the Rust types. `type_name` is what iceoryx2 compares when a
 topic is opened: a build of Gyre with another version of a message is refused, not misread.

@@ -4,6 +4,7 @@
 use std::{fs, path::Path};
 
 use bolero::{TypeGenerator, check};
+use gyre_contract::{Item, PoseHeader};
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
@@ -13,8 +14,7 @@ use gyre_journal::{
     self as journal, Journal,
     checkpoint::{self, Checkpoint},
 };
-use gyre_messages::{Item, PoseHeader};
-use gyre_scan_matching::{RefinementConfig, Refiner};
+use gyre_matching::{RefinementConfig, Refiner};
 
 use crate::recordings::folder;
 

@@ -3,17 +3,17 @@
 use std::sync::{Mutex, PoisonError};
 
 use bolero::{TypeGenerator, check};
+use gyre_contract::{
+    MaskedHeader, MotionEstimate, MotionHeader, PoseHeader, RotationEstimate, ScanHeader, compose,
+};
 use gyre_fuzz::{Failure, Target, edit::Number};
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_messages::{
-    MaskedHeader, MotionEstimate, MotionHeader, PoseHeader, RotationEstimate, ScanHeader, compose,
-};
-use gyre_radar::{PointsConfig, RasterConfig};
-use gyre_scan_matching::{
+use gyre_matching::{
     ExhaustiveConfig, ExhaustiveSearch, MotionMatch, RefinementConfig, Refiner, RotationConfig,
     SequentialRotation, TranslationConfig, TranslationSearch,
 };
+use gyre_radar::{PointsConfig, RasterConfig};
 use ndarray::Array2;
 
 const N: usize = 31;

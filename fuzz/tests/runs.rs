@@ -4,12 +4,12 @@ use std::{fs, path::Path, slice};
 
 use bolero::check;
 use bytemuck::{Zeroable, bytes_of};
+use gyre_contract::{GivenAnew, Item, ScanHeader};
 use gyre_datasets::DatasetOptions;
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_messages::{GivenAnew, Item, ScanHeader};
 use gyre_radar::OwnedScan;
 use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingWriter};
 

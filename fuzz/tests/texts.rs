@@ -13,7 +13,7 @@ use gyre_fuzz::{
     edit::{TextEdit, edit_text},
 };
 use gyre_masking::{MaskKind, MaskingConfig, model::Model};
-use gyre_odometry::Odometry;
+use gyre_matching::odometry::Odometry;
 use gyre_radar::RasterConfig;
 use gyre_results::{judgement::judge, odometry};
 

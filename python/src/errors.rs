@@ -5,7 +5,7 @@ use std::{ffi::CString, fmt::Display};
 use gyre_configuration::AutomaticError;
 use gyre_datasets::{LogError, OpenError};
 use gyre_masking::MaskError;
-use gyre_odometry::OdometryError;
+use gyre_matching::odometry::OdometryError;
 use gyre_radar::NoDoppler;
 use pyo3::{prelude::*, sync::PyOnceLock, types::PyType};
 

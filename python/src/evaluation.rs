@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf};
 
-use gyre_evaluation::{
+use gyre_results::evaluation::{
     TimedPoses,
     plot::{errors_svg, trajectory_svg},
 };
@@ -26,7 +26,8 @@ pub fn evaluate(
     let step = NonZeroUsize::new(step);
     let step = step.ok_or_else(|| PyValueError::new_err("step is 0, but must be 1 or more"))?;
     let (estimate, truth) = (&estimate.get().0, &truth.get().0);
-    let evaluation = py.detach(|| gyre_evaluation::evaluate(timed(estimate), timed(truth), step));
+    let evaluation =
+        py.detach(|| gyre_results::evaluation::evaluate(timed(estimate), timed(truth), step));
     evaluation.map(Evaluation).map_err(errors::trajectory)
 }
 
@@ -38,7 +39,7 @@ fn timed(trajectory: &gyre_radar::Trajectory) -> TimedPoses<'_> {
 /// The errors of a trajectory against ground truth. `str(evaluation)` is a table, and `to_dict()`
 /// has every figure.
 #[pyclass(module = "gyre", frozen)]
-pub struct Evaluation(gyre_evaluation::Evaluation);
+pub struct Evaluation(gyre_results::evaluation::Evaluation);
 
 #[pymethods]
 impl Evaluation {

@@ -2,7 +2,7 @@
 
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::Sweep;
-use gyre_odometry::OdometryError;
+use gyre_matching::odometry::OdometryError;
 use gyre_radar::{LostAzimuthFinder, PlacedRows, PolarScan, continues};
 use ndarray::ArrayViewMut2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};

@@ -1,7 +1,7 @@
 //! Odometry.
 
-use gyre_odometry::OdometryError;
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
+use gyre_matching::odometry::OdometryError;
 use pyo3::prelude::*;
 
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
 pub struct Odometry(Guarded<State>);
 
 struct State {
-    odometry: gyre_odometry::Odometry,
+    odometry: gyre_matching::odometry::Odometry,
     trajectory: gyre_radar::Trajectory,
 }
 
@@ -47,7 +47,7 @@ impl Odometry {
     #[pyo3(signature = (config=None))]
     fn new(py: Python<'_>, config: Option<&Bound<'_, Config>>) -> PyResult<Self> {
         let config = Config::method(config).odometry;
-        let odometry = py.detach(|| gyre_odometry::Odometry::new(&config));
+        let odometry = py.detach(|| gyre_matching::odometry::Odometry::new(&config));
         let state = State {
             odometry: odometry.map_err(errors::config)?,
             trajectory: gyre_radar::Trajectory::default(),

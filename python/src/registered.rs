@@ -1,7 +1,7 @@
 //! Registered scans.
 
 use gyre_geometry::{UncertainMotion, pose};
-use gyre_odometry::Outcome;
+use gyre_matching::odometry::Outcome;
 use pyo3::prelude::*;
 
 use crate::pose::Pose;
@@ -9,7 +9,7 @@ use crate::pose::Pose;
 /// A registered scan: what `Odometry.register` returns.
 #[pyclass(module = "gyre", frozen)]
 pub struct Registered {
-    pub registered: gyre_odometry::Registered,
+    pub registered: gyre_matching::odometry::Registered,
     /// The time of the scan, ns.
     #[pyo3(get)]
     pub stamp_ns: i64,

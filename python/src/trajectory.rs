@@ -3,8 +3,8 @@
 use std::{io, path::PathBuf};
 
 use gyre_datasets::{read_trajectory, write_kitti, write_tum};
-use gyre_evaluation::plot::path_svg;
 use gyre_geometry::{Pose, pose, xy_yaw};
+use gyre_results::evaluation::plot::path_svg;
 use ndarray::{Array2, Ix2};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyTuple};

@@ -94,7 +94,7 @@ def matrix(row):
 
 
 def composed(rows):
-    """The pose and its covariance after each motion, as `ComposedMotion` in shared/method/geometry."""
+    """The pose and its covariance after each motion, as `ComposedMotion` in shared/geometry."""
     at, drift = np.zeros(3), np.zeros((3, 3))
     for k, row in enumerate(rows):
         share, covariance = float(row["drift_share"]), matrix(row)

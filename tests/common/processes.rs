@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::{FollowerId, StageId};
+use gyre_contract::{FollowerId, StageId};
 use rustix::process::{Signal, kill_process};
 
 pub type Pid = u32;

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::FollowerId;
+use gyre_contract::FollowerId;
 use rustix::process::Signal;
 use tempfile::TempDir;
 

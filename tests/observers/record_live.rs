@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use gyre_contract::flag;
 use gyre_journal as journal;
-use gyre_messages::flag;
 use gyre_recording::{open_recording, parts};
 use rustix::process::Signal;
 

@@ -4,7 +4,7 @@ mod stages;
 
 use std::{env, process, thread};
 
-use gyre_messages::StageId;
+use gyre_contract::StageId;
 use gyre_stage::Launch;
 use serde_json::Value;
 

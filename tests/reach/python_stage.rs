@@ -10,11 +10,11 @@ use std::{
     process::Command,
 };
 
-use gyre_messages::{
+use gyre_contract::{
     ByteBlock, FloatBlock, Hop, Item, MaskedHeader, MotionEstimate, MotionHeader, PoseHeader,
     RefinementRecord, RotationEstimate, ScanHeader,
 };
-use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
+use gyre_geometry::samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use rustix::process::Signal;
 use serde_json::Value;
 

@@ -13,10 +13,10 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
+use gyre_contract::run::Ending;
+use gyre_contract::{Hop, Item, MotionEstimate, PoseHeader, flag};
 use gyre_journal::{self as journal, Journal};
-use gyre_messages::{Hop, Item, MotionEstimate, PoseHeader, flag};
 use gyre_results::{Out, Session};
-use gyre_run::Ending;
 use tempfile::TempDir;
 
 /// Poses that a restart asks for with a usual window.

@@ -85,7 +85,7 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
         );
     }
     assert_eq!(
-        gyre_mapping::Map::open(&out).unwrap().keyframes(),
+        gyre_slam::mapping::Map::open(&out).unwrap().keyframes(),
         all.keyframes().len()
     );
     assert!(out.join("map.png").is_file());

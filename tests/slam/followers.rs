@@ -3,7 +3,7 @@
 
 use std::{fs, sync::OnceLock};
 
-use gyre_messages::FollowerId;
+use gyre_contract::FollowerId;
 use gyre_slam::{Keyframe, Query, RecordReader, records_path};
 use rustix::process::Signal;
 

@@ -8,10 +8,10 @@ use std::{
 };
 
 use gyre_datasets::read_trajectory;
-use gyre_mapping::{Map, Origin};
+use gyre_geometry::samples::{Geographic, LocalPlane};
 use gyre_radar::Trajectory;
 use gyre_ros2_messages::{Ros2Message, encode, sensor_msgs::NavSatFix, std_msgs::Header};
-use gyre_samples::{Geographic, LocalPlane};
+use gyre_slam::mapping::{Map, Origin};
 use mcap::{MessageStream, WriteOptions, records::MessageHeader};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::Value;

@@ -2,8 +2,8 @@
 
 use std::{process::Command, sync::Arc};
 
-use gyre_estimation::G2o;
 use gyre_geometry::xy_yaw;
+use gyre_slam::estimation::G2o;
 
 use crate::common::{Ended, Run, Shared, python};
 

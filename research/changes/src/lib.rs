@@ -23,7 +23,7 @@ mod survey;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use gyre_mapping::{TILE_CELLS, TileIndex};
+use gyre_slam::mapping::{TILE_CELLS, TileIndex};
 use gyre_masking::networks::{PlanesError, PlanesNetwork};
 use gyre_slam::localisation::PlacedDrive;
 use serde::Serialize;

@@ -14,7 +14,7 @@ use gyre_datasets::ground_truth::read_trajectory;
 use gyre_slam::localisation::{Localiser, PlacedDrive};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_storage::{self as storage, StorageError};
-use gyre_terminal::{Failure, print};
+use gyre_configuration::terminal::{Failure, print};
 use gyre_tools::maps::localise::searched_map;
 use gyre_tools::maps::map::{self, keyframes, placing};
 use serde::Serialize;
@@ -51,8 +51,8 @@ struct Report<'a> {
 }
 
 fn main() -> ExitCode {
-    match gyre_terminal::parse::<Arguments>("gyre-changes") {
-        Ok(arguments) => gyre_terminal::report("gyre-changes", compare(&arguments)),
+    match gyre_configuration::terminal::parse::<Arguments>("gyre-changes") {
+        Ok(arguments) => gyre_configuration::terminal::report("gyre-changes", compare(&arguments)),
         Err(code) => code,
     }
 }

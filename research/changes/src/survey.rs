@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use gyre_geometry::Pose;
-use gyre_mapping::{MapOptions, TILE_CELLS, TileIndex, View};
+use gyre_slam::mapping::{MapOptions, TILE_CELLS, TileIndex, View};
 use gyre_slam::Keyframe;
 use nalgebra::Point2;
 

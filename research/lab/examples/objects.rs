@@ -17,11 +17,11 @@ use std::path::Path;
 use std::{env, fs};
 
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
-use gyre_evaluation::{ObjectScan, TrackedObject, TrueObject, object_errors};
+use gyre_results::evaluation::{ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
 use gyre_masking::networks::runtime;
 use gyre_objects::{Object, ObjectTracker, PlacedScan};
-use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
 use gyre_worlds::drive::DriveKind;
 use gyre_worlds::weather::WeatherConfig;

@@ -10,7 +10,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use gyre_estimation::{G2o, GraphOptions, Kernel, PoseGraph};
+use gyre_slam::estimation::{G2o, GraphOptions, Kernel, PoseGraph};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1).peekable();

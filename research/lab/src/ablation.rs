@@ -3,7 +3,7 @@
 
 use std::{path::Path, process::ExitCode, slice};
 
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use serde::Deserialize;
 
 use crate::{

@@ -20,7 +20,7 @@ use std::{
 use clap::{Args, ValueEnum, builder::PossibleValue};
 use gyre_datasets::{Dataset, DatasetOptions};
 use gyre_radar::OwnedScan;
-use gyre_terminal::{Failure, print};
+use gyre_configuration::terminal::{Failure, print};
 use gyre_tools::masks::picture::write_grey;
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -30,7 +30,7 @@ use std::{fs, path::PathBuf, process::ExitCode, time::Instant};
 use gyre_configuration::Configuration;
 use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
-use gyre_terminal::{Failure, print};
+use gyre_configuration::terminal::{Failure, print};
 
 use crate::{
     cli::ExportPairsArguments,

@@ -6,12 +6,12 @@ use std::{ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use gyre_configuration::{Configuration, gnss_log};
-use gyre_estimation::{Position, align};
+use gyre_slam::estimation::{Position, align};
 use gyre_geometry::Pose;
 use gyre_radar::median;
-use gyre_samples::{GnssConfig, GnssFix};
+use gyre_geometry::samples::{GnssConfig, GnssFix};
 use gyre_slam::{EstimatorKind, Fixes, Keyframe, Query, RecordReader, TrajectoryEstimator};
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use nalgebra::{Point2, Vector2};
 use serde_json::{Value, json};
 

@@ -9,7 +9,7 @@ use clap::Args;
 use gyre_configuration::Configuration;
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_slam::localisation::{Fix, Localiser, Status};
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use gyre_tools::maps::localise::{Scans, searched_map};
 use rustix::time::{ClockId, clock_gettime};
 

@@ -20,7 +20,7 @@ use std::process::ExitCode;
 use cli::{Command, Lab};
 
 fn main() -> ExitCode {
-    let command = match gyre_terminal::parse::<Lab>("gyre-lab") {
+    let command = match gyre_configuration::terminal::parse::<Lab>("gyre-lab") {
         Ok(lab) => lab.command,
         Err(code) => return code,
     };
@@ -34,5 +34,5 @@ fn main() -> ExitCode {
         Command::Gnss(arguments) => gnss::gnss(&arguments),
         Command::Localisation(arguments) => localisation::localisation(&arguments),
     };
-    gyre_terminal::report("gyre-lab", result)
+    gyre_configuration::terminal::report("gyre-lab", result)
 }

@@ -5,9 +5,9 @@ mod counts;
 use std::{fmt::Write, path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
-use gyre_estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex, Verification};
+use gyre_slam::estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex, Verification};
 use gyre_geometry::xy_yaw;
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use nalgebra::Vector3;
 
 use crate::{

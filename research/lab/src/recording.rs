@@ -13,7 +13,7 @@ use gyre_datasets::{
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, Trajectory};
 use gyre_results::SIMULATED_TRUTH;
-use gyre_terminal::{Failure, print};
+use gyre_configuration::terminal::{Failure, print};
 
 /// A trajectory is not interpolated across wider gaps, as in `gyre evaluate`, but for those that
 /// all its steps are.
@@ -96,7 +96,7 @@ impl Track {
 
     fn new(path: PathBuf, trajectory: Trajectory) -> Self {
         let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
-        let max_gap_ns = gyre_evaluation::max_gap_ns(stamps, MAX_GAP_NS).unsigned_abs();
+        let max_gap_ns = gyre_results::evaluation::max_gap_ns(stamps, MAX_GAP_NS).unsigned_abs();
         Self {
             path,
             trajectory,

@@ -4,7 +4,7 @@
 use std::{collections::BTreeMap, env, fs, io, path::Path};
 
 use gyre_results::machine::{Machine, today};
-use gyre_terminal::{Failure, print};
+use gyre_configuration::terminal::{Failure, print};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 

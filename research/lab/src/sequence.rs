@@ -9,8 +9,8 @@ use std::{
 
 use clap::Args;
 use gyre_configuration::Configuration;
-use gyre_messages::StageId;
-use gyre_terminal::{Failure, print};
+use gyre_contract::StageId;
+use gyre_configuration::terminal::{Failure, print};
 use serde_json::{Value, json};
 
 use crate::{

@@ -7,9 +7,9 @@ mod wrong;
 use std::{convert::Infallible, path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
-use gyre_estimation::Constraint;
+use gyre_slam::estimation::Constraint;
 use gyre_slam::{EstimatorKind, LoopCloser, Query, SUBMAP_REACH_M, TrajectoryEstimator};
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 
 use crate::{
     drive::Drive,

@@ -11,7 +11,7 @@ mod times;
 
 use std::{path::Path, process::ExitCode};
 
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use serde_json::json;
 
 use crate::{

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use gyre_samples::{Geographic, LocalPlane, RawFix};
+use gyre_geometry::samples::{Geographic, LocalPlane, RawFix};
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use gyre_datasets::{DatasetOptions, Format, ImageSize, ImageSource};
 use gyre_radar::{OwnedScan, ScanSlot};
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;

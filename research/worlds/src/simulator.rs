@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::{RawFix, Sample};
+use gyre_geometry::samples::{RawFix, Sample};
 use nalgebra::Point2;
 
 use crate::config::{MAX_SCANS, SimulationConfig};

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use gyre_geometry::{Pose, Twist};
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 use nalgebra::Translation2;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;

@@ -6,12 +6,12 @@ mod ros2;
 use std::{io::IsTerminal, path::PathBuf};
 
 use clap::Args;
-use gyre_results::Form;
-use gyre_run::Rate;
-use gyre_terminal::{
+use gyre_configuration::terminal::{
     Failure,
     inputs::{Given, Inputs},
 };
+use gyre_contract::run::Rate;
+use gyre_results::Form;
 
 pub use link::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 pub use ros2::Ros2Arguments;

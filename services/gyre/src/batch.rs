@@ -12,9 +12,9 @@ use std::{
 
 use clap::Args;
 use gyre_configuration::paths::shipped;
+use gyre_configuration::terminal::{Failure, INTERRUPTED, print};
 use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
 use gyre_stage::run::end_with;
-use gyre_terminal::{Failure, INTERRUPTED, print};
 use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
 use rustix::process::Signal;
 

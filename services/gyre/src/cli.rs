@@ -5,8 +5,8 @@ mod help;
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
+use gyre_configuration::terminal::inputs::ConfigArguments;
 use gyre_results::evaluate::EvaluateArguments;
-use gyre_terminal::inputs::ConfigArguments;
 use gyre_tools::export::ExportArguments;
 use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
 use gyre_tools::masks::MasksArguments;

@@ -3,14 +3,14 @@
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::{Args, builder::PossibleValuesParser};
+use gyre_configuration::terminal::inputs::Inputs;
+use gyre_configuration::terminal::{Failure, INTERRUPTED, own, print, seconds, words};
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
-use gyre_messages::StageId;
-use gyre_odometry::SearchKind;
-use gyre_run::Scheduling;
-use gyre_scan_matching::RefinementKind;
+use gyre_contract::StageId;
+use gyre_contract::run::Scheduling;
+use gyre_matching::RefinementKind;
+use gyre_matching::odometry::SearchKind;
 use gyre_stage::{StageError, wake::Signals};
-use gyre_terminal::inputs::Inputs;
-use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
 use gyre_tools::conformance::{Candidate, Demands, Report, Test, check};
 
 use crate::{arguments::RunArguments, preflight, program, run::resolve};

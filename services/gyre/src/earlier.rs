@@ -9,6 +9,9 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::StageId;
+use gyre_contract::run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side};
 use gyre_journal::{
     self as journal, Content, JournalError,
     checkpoint::{self, Checkpoint},
@@ -16,16 +19,13 @@ use gyre_journal::{
     objects::LoggedObjects,
     scans::{LoggedScan, complete_scans},
 };
-use gyre_messages::StageId;
-use gyre_recorder::Ledger;
+use gyre_matching::Refiner;
 use gyre_recording::received_fixes;
 use gyre_results::{FILES, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
-use gyre_run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side};
-use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
 use gyre_stage::Generation;
 use gyre_storage::{self as storage, GroupSync, LogError};
-use gyre_terminal::{Failure, print};
+use gyre_watch::recorder::Ledger;
 
 pub use replaced::{is_untouched, settle};
 

@@ -3,9 +3,9 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
+use gyre_configuration::terminal::inputs::{Inputs, configuration};
+use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
-use gyre_terminal::inputs::{Inputs, configuration};
-use gyre_terminal::{Failure, print};
 
 #[derive(Debug, Args)]
 pub struct InspectArguments {

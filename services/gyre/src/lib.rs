@@ -32,8 +32,8 @@ pub mod watch;
 
 use std::{path::PathBuf, process::ExitCode};
 
+use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
 use gyre_configuration::{Configuration, schema};
-use gyre_terminal::{Failure, inputs::Inputs, print};
 
 use arguments::RunArguments;
 use cli::Command;
@@ -95,7 +95,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Export(arguments) => gyre_tools::export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => conformance::conformance(&arguments),
-        Command::Config(arguments) => gyre_terminal::inputs::config(&arguments),
+        Command::Config(arguments) => gyre_configuration::terminal::inputs::config(&arguments),
         Command::Schema { markdown } => {
             print::line(match markdown {
                 true => schema::reference(),

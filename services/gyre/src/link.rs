@@ -2,11 +2,11 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use gyre_messages::Footprint;
+use gyre_configuration::terminal::{Failure, INTERRUPTED, own, print};
+use gyre_contract::Footprint;
+use gyre_contract::run::LinkConfig;
 use gyre_results::Out;
-use gyre_run::LinkConfig;
 use gyre_stage::{run::sweep, wake::Signals};
-use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
 use crate::{
     arguments::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},

@@ -10,8 +10,8 @@ use gyre_stage::CountingAllocator;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    match gyre_terminal::parse_as::<Gyre>(gyre::cli::command(), "gyre") {
-        Ok(gyre) => gyre_terminal::report("gyre", gyre::execute(gyre.command)),
+    match gyre_configuration::terminal::parse_as::<Gyre>(gyre::cli::command(), "gyre") {
+        Ok(gyre) => gyre_configuration::terminal::report("gyre", gyre::execute(gyre.command)),
         Err(code) => code,
     }
 }

@@ -6,9 +6,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::PoseHeader;
+use gyre_configuration::terminal::print;
+use gyre_contract::PoseHeader;
 use gyre_supervise::Event;
-use gyre_terminal::print;
 use sd_notify::NotifyState;
 
 const STATUS_EVERY: Duration = Duration::from_secs(5);

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use gyre_configuration::Configuration;
-use gyre_messages::{FollowerId, StageId};
-use gyre_run::{LinkConfig, Mode, RecordConfig, Side, StageConfig};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::{LinkConfig, Mode, RecordConfig, Side, StageConfig};
+use gyre_contract::{FollowerId, StageId};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
-use gyre_terminal::Failure;
 
 pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan> {
     let live = configuration.run.mode == Mode::Live;
@@ -84,8 +84,8 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
 /// Checks that a run overwrites no recording except one that it continues.
 pub fn require_recordable(record: &RecordConfig, out: &Path, goes_on: bool) -> Result<(), Failure> {
     match (record.is_on(), goes_on) {
-        (true, true) => Ok(gyre_recorder::require_own(&record.file, out)?),
-        (true, false) => Ok(gyre_recorder::require_new(&record.file)?),
+        (true, true) => Ok(gyre_watch::recorder::require_own(&record.file, out)?),
+        (true, false) => Ok(gyre_watch::recorder::require_new(&record.file)?),
         (false, _) => Ok(()),
     }
 }

@@ -6,16 +6,16 @@ use std::{
     time::Duration,
 };
 
+use gyre_configuration::terminal::{Failure, print};
 use gyre_configuration::{Configuration, Played, gnss_log, open};
+use gyre_contract::run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind};
+use gyre_contract::{Footprint, Limits, StageId, Window};
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
+use gyre_geometry::samples::{GyroKind, MAX_SAMPLES};
 use gyre_masking::Masker;
-use gyre_messages::{Footprint, Limits, StageId, Window};
-use gyre_run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind};
-use gyre_samples::{GyroKind, MAX_SAMPLES};
 use gyre_stage::{Manifest, run::free_shared_memory};
 use gyre_stages::live_radar::{Settings, Sizes};
 use gyre_stages::radar_replay::{Listing, Player};
-use gyre_terminal::{Failure, print};
 use gyre_tools::maps::localise::searched_map;
 use rustix::process::{Resource, getrlimit};
 
@@ -60,7 +60,7 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
         &configuration.odometry.masking,
     )?;
     if configuration.objects.is_on() {
-        gyre_followers::objects::tracker(&configuration.odometry.masking)?;
+        gyre_stages::followers::objects::tracker(&configuration.odometry.masking)?;
     }
     check_gnss(configuration)?;
     if configuration.slam.is_localised() {

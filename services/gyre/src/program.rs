@@ -8,10 +8,10 @@ use std::{collections::BTreeMap, io, path::Path};
 
 use blake3::Hasher;
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::own;
+use gyre_contract::run::StageConfig;
 use gyre_results::Programs;
-use gyre_run::StageConfig;
 use gyre_supervise::StagePlan;
-use gyre_terminal::own;
 
 use crate::plan::stage_plans;
 

@@ -4,7 +4,7 @@ mod silence;
 
 use std::{fmt::Display, time::Instant};
 
-use gyre_messages::{Item, PoseHeader};
+use gyre_contract::{Item, PoseHeader};
 use gyre_stage::{Manifest, clock, source::received_of};
 use gyre_supervise::Event;
 use gyre_tools::bar::Bar;

@@ -3,9 +3,9 @@
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
-use gyre_recorder::{Options, Split};
-use gyre_terminal::{Failure, print, seconds};
+use gyre_configuration::terminal::{Failure, print, seconds};
 use gyre_tools::operate::RunChoice;
+use gyre_watch::recorder::{Options, Split};
 
 #[derive(Debug, Args)]
 pub struct RecordArguments {
@@ -50,7 +50,7 @@ pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
         },
         continues: arguments.continues,
     };
-    Ok(match gyre_recorder::record(&options) {
+    Ok(match gyre_watch::recorder::record(&options) {
         Ok(recorded) => {
             print::note(&recorded);
             // To the run it is no failure, and no reason for a restart.

@@ -3,14 +3,14 @@
 use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::run::SourceConfig;
 use gyre_datasets::DatasetOptions;
 use gyre_results::{absolute, map_options};
 use gyre_ros2_bridge::{Bridge, MapSettings, Settings, source};
 use gyre_ros2_messages::Domain;
-use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
 use gyre_stages::live_radar::Sizes;
-use gyre_terminal::{Failure, print};
 
 use crate::arguments::Ros2Arguments;
 

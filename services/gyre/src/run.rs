@@ -9,12 +9,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_configuration::terminal::{Failure, INTERRUPTED, execute_again, own, print};
 use gyre_configuration::{Configuration, describe_masks, describe_objects, with_stored_options};
+use gyre_contract::run::Ending;
 use gyre_datasets::GnssLog;
+use gyre_geometry::samples::GnssKind;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
-use gyre_run::Ending;
-use gyre_samples::GnssKind;
 use gyre_stage::{
     Manifest, StageError,
     run::{RunRoot, sweep},
@@ -23,7 +24,6 @@ use gyre_stage::{
 };
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
-use gyre_terminal::{Failure, INTERRUPTED, execute_again, own, print};
 use gyre_tools::operate::detach_if_asked;
 
 use crate::{

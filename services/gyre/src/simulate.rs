@@ -9,11 +9,11 @@ use std::{
 
 use clap::Args;
 use gyre_configuration::strict::path_value;
+use gyre_configuration::terminal::{Failure, inputs::configuration, print};
 use gyre_results::Content;
 use gyre_simulator::{
     OutputFormat, SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset,
 };
-use gyre_terminal::{Failure, inputs::configuration, print};
 use gyre_tools::bar::Bar;
 
 #[derive(Debug, Args)]

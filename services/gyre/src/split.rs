@@ -3,9 +3,9 @@
 use std::env;
 
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, execute_again};
+use gyre_contract::run::LinkConfig;
 use gyre_link::ONE_THREAD;
-use gyre_run::LinkConfig;
-use gyre_terminal::{Failure, execute_again};
 
 /// Checks that the other side of a split run can be reached as it is configured.
 pub fn check(configuration: &Configuration) -> Result<(), Failure> {
@@ -32,9 +32,9 @@ pub fn set_environment() -> Result<(), Failure> {
 pub fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
     match link.cut {
         #[cfg(feature = "link")]
-        gyre_run::PlayedFrom::Scan => {
+        gyre_contract::run::PlayedFrom::Scan => {
             let name = &link.name;
-            gyre_terminal::print::note(format_args!(
+            gyre_configuration::terminal::print::note(format_args!(
                 "link {name}: waiting for the robot, which knows how large its scans are"
             ));
             Ok(gyre_link::ask_robot(link)?)

@@ -7,16 +7,16 @@ use std::{
     process::ExitCode,
 };
 
+use gyre_configuration::terminal::{own, print};
 use gyre_configuration::{process_names, simulated_samples};
+use gyre_contract::run::{SourceConfig, SourceKind, StageConfig};
+use gyre_contract::{FollowerId, StageId};
 use gyre_datasets::DatasetOptions;
-use gyre_messages::{FollowerId, StageId};
-use gyre_run::{SourceConfig, SourceKind, StageConfig};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
 use gyre_stages::live_radar::Settings;
 use gyre_stages::radar_replay::Pace;
 use gyre_stages::search::{python, rotation, translation};
-use gyre_terminal::{own, print};
 use rustix::{
     process::{Pid, getppid},
     thread::set_name,
@@ -73,10 +73,10 @@ fn work_of_stage(stage: StageId, python: Option<PathBuf>) -> Work {
 
 fn work_of_follower(follower: FollowerId) -> Work {
     Box::new(match follower {
-        FollowerId::LoopClosure => gyre_followers::loop_closure::run,
-        FollowerId::Trajectory => gyre_followers::trajectory::run,
-        FollowerId::Localisation => gyre_followers::localisation::run,
-        FollowerId::Objects => gyre_followers::objects::run,
+        FollowerId::LoopClosure => gyre_stages::followers::loop_closure::run,
+        FollowerId::Trajectory => gyre_stages::followers::trajectory::run,
+        FollowerId::Localisation => gyre_stages::followers::localisation::run,
+        FollowerId::Objects => gyre_stages::followers::objects::run,
     })
 }
 
@@ -104,7 +104,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
 /// Integrates motions to poses, or leaves that to the other side of a link.
 fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
     #[cfg(feature = "link")]
-    if is_side(launch, gyre_run::Side::Robot)? {
+    if is_side(launch, gyre_contract::run::Side::Robot)? {
         return gyre_link::run_robot(launch);
     }
     gyre_stages::pose_integration::run(launch)
@@ -112,15 +112,15 @@ fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
 
 /// A build without the feature refuses to begin a split run.
 #[cfg(feature = "link")]
-fn is_side(launch: &Launch, side: gyre_run::Side) -> Result<bool, StageError> {
-    let link: gyre_run::LinkConfig = launch.section("link")?;
+fn is_side(launch: &Launch, side: gyre_contract::run::Side) -> Result<bool, StageError> {
+    let link: gyre_contract::run::LinkConfig = launch.section("link")?;
     Ok(link.side == Some(side))
 }
 
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     #[cfg(feature = "link")]
-    if is_side(launch, gyre_run::Side::Base)? {
+    if is_side(launch, gyre_contract::run::Side::Base)? {
         return gyre_link::run_base(launch);
     }
     let source: SourceConfig = launch.section("source")?;

@@ -4,14 +4,14 @@ use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
 use gyre_configuration::Configuration;
-use gyre_messages::StageId;
+use gyre_configuration::terminal::{Failure, inputs::Inputs, own, print};
+use gyre_contract::StageId;
+use gyre_contract::run::Scenario;
+use gyre_matching::RefinementKind;
 use gyre_results::{
     Content, Out,
     machine::{Machine, today},
 };
-use gyre_run::Scenario;
-use gyre_scan_matching::RefinementKind;
-use gyre_terminal::{Failure, inputs::Inputs, own, print};
 use gyre_tools::stress::{
     Options, Others, Provenance, Report, TestedPipeline, report::Verdict, witness_fault,
 };

@@ -8,11 +8,11 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_results::Out;
 use gyre_stage::{StageError, control::Status, run::RunRoot, wake::Signals};
 use gyre_stages::live_radar::{AskError, Sizes};
 use gyre_supervise::wait;
-use gyre_terminal::{Failure, print};
 
 use crate::{notify::Notifier, preflight::ask};
 

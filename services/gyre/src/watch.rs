@@ -3,9 +3,9 @@
 use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 
 use clap::Args;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_results::absolute;
 use gyre_stage::{observer::ObservedRun, wake::Signals};
-use gyre_terminal::{Failure, print};
 use gyre_tools::operate::RunChoice;
 use gyre_watch::{Endpoint, Server, Token};
 

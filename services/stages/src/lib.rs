@@ -1,10 +1,11 @@
 //! The stages of the pipeline, a module for each.
 
+use gyre_contract::Masked;
 use gyre_geometry::SparsePoint;
 use gyre_journal::JournalError;
-use gyre_messages::Masked;
 use gyre_stage::{StageError, reader::Received};
 
+pub mod followers;
 pub mod live_radar;
 pub mod masking;
 pub mod pose_integration;

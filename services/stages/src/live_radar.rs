@@ -13,8 +13,8 @@ mod turn_counter;
 use std::time::Duration;
 
 use gyre_colossus::{Address, BadAddress};
+use gyre_contract::run::SourceConfig;
 use gyre_datasets::DatasetOptions;
-use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, Sizes, ask};

@@ -8,14 +8,14 @@ mod motions;
 mod python;
 mod scans;
 
+use gyre_contract::{Item, Masked, MaskedHeader, StageId, flag, mask_kind};
 use gyre_geometry::Twist;
+use gyre_geometry::samples::DopplerConfig;
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_messages::{Item, Masked, MaskedHeader, StageId, flag, mask_kind};
 use gyre_radar::{
     DopplerEstimator, LostAzimuthFinder, LostAzimuths, PlacedRows, PointsConfig, RasterConfig,
     lost::stale_rows,
 };
-use gyre_samples::DopplerConfig;
 use gyre_stage::{Launch, Stage, StageCounters, StageError, stage, writer::Draft};
 
 use scans::{MovedScan, ScanView, Scans};

@@ -2,8 +2,8 @@
 //! pose before it is published. With SLAM it logs keyframes, with objects each scan. In live mode
 //! poses continue when the disk is full, and are not kept from then on.
 
+use gyre_contract::{Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag};
 use gyre_journal::{self as journal, Journal, PoseLog, keyframes::Keyframes, scans::Scans};
-use gyre_messages::{Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag};
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{

@@ -9,10 +9,10 @@ mod player;
 
 use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path};
 
+use gyre_contract::run::{PlayedFrom, SourceConfig};
+use gyre_contract::{ScanHeader, StageId};
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
-use gyre_messages::{ScanHeader, StageId};
-use gyre_run::{PlayedFrom, SourceConfig};
-use gyre_samples::{GyroConfig, WheelsConfig};
+use gyre_geometry::samples::{GyroConfig, WheelsConfig};
 use gyre_stage::{
     Launch, Source, StageCounters, StageError,
     source::{self, Unreadable},

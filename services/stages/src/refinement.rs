@@ -1,13 +1,13 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
+use gyre_contract::{Item, Masked, Motion, Refined, StageId, flag};
+use gyre_geometry::samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_journal::{
     checkpoint::{self, Checkpoint},
     continue_when_full,
 };
-use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
+use gyre_matching::{Aiding, RefinementConfig, Refiner};
 use gyre_radar::PointsConfig;
-use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
-use gyre_scan_matching::{Aiding, RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView},

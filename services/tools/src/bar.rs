@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_terminal::{WIDTH, print, wrap};
+use gyre_configuration::terminal::{WIDTH, print, wrap};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Time between two plain lines.

@@ -20,10 +20,10 @@ mod topics;
 
 use std::{io, path::Path, time::Duration};
 
-use gyre_messages::StageId;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::StageId;
 use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::{SuperviseError, rig::Rig};
-use gyre_terminal::Failure;
 
 pub use harness::Candidate;
 pub use report::{Report, Work};

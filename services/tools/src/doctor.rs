@@ -2,13 +2,13 @@
 
 use std::{collections::BTreeSet, fs, process::ExitCode};
 
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::Footprint;
 use gyre_masking::networks::runtime::{self, RuntimeError};
-use gyre_messages::Footprint;
 use gyre_stage::{
     python_function::Interpreter,
     run::{SHARED_MEMORY, free_shared_memory},
 };
-use gyre_terminal::{Failure, print};
 
 const GOVERNORS: &str = "/sys/devices/system/cpu/cpufreq";
 

@@ -8,12 +8,12 @@ mod source;
 
 use std::{path::Path, process::ExitCode};
 
+use gyre_configuration::terminal::{Failure, print};
 use gyre_recording::bags::{BagWriter, Kept, Topic};
 use gyre_ros2_messages::{
     Vehicle, nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
     visualization_msgs::MarkerArray,
 };
-use gyre_terminal::{Failure, print};
 
 pub use arguments::{ExportArguments, FrameArguments, ScanForm};
 use scans::ScanWriter;

@@ -9,8 +9,8 @@ use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use gyre_configuration::describe_masks_in_process;
+use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
 use gyre_results::Content;
-use gyre_terminal::{Failure, inputs::Inputs, print};
 
 use drawing::Canvas;
 use inspector::MaskInspector;

@@ -6,9 +6,9 @@ use std::{
 };
 
 use clap::{Args, Subcommand, builder::PossibleValuesParser};
-use gyre_run::StageConfig;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::run::StageConfig;
 use gyre_storage as storage;
-use gyre_terminal::{Failure, print};
 
 /// A kind of project.
 #[derive(Debug, Subcommand)]

@@ -5,9 +5,9 @@ mod server;
 
 use std::{process::ExitCode, time::Duration};
 
+use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
 use gyre_configuration::{Configuration, Played};
 use gyre_stage::wake::Signals;
-use gyre_terminal::{Failure, inputs::Inputs, print};
 
 pub use arguments::RadarServerArguments;
 pub(crate) use server::configuration;
@@ -43,6 +43,6 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
 fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
     let given = inputs.given_recording()?;
     let named = given.configuration.as_deref();
-    let configuration = gyre_terminal::inputs::configuration(named, &inputs.set)?;
+    let configuration = gyre_configuration::terminal::inputs::configuration(named, &inputs.set)?;
     Ok(configuration.streaming(given.data.as_deref()))
 }

@@ -11,9 +11,9 @@ use std::{
 };
 
 use clap::Args;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::read_trajectory;
 use gyre_results::{evaluate::truth_of_run, write_page};
-use gyre_terminal::{Failure, print};
 
 use page::page;
 use subject::Subject;

@@ -17,11 +17,11 @@ pub mod witness_fault;
 
 use std::{ops::Range, path::PathBuf, time::Duration};
 
-use gyre_messages::StageId;
-use gyre_run::Budget;
+use gyre_contract::StageId;
+use gyre_contract::run::Budget;
 
 pub use campaign::{Options, stress};
-pub use gyre_run::Scenario;
+pub use gyre_contract::run::Scenario;
 pub use report::{Provenance, Report};
 
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use gyre_datasets::DatasetOptions;
-use gyre_samples::{GyroConfig, WheelsConfig};
+use gyre_geometry::samples::{GyroConfig, WheelsConfig};
 use gyre_storage as storage;
 
 use crate::{ConfigurationError, strict};

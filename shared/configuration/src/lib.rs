@@ -15,6 +15,8 @@ mod scans;
 #[cfg(feature = "run")]
 pub mod schema;
 pub mod strict;
+#[cfg(feature = "run")]
+pub mod terminal;
 
 pub use automatic::{Automatic, AutomaticError, automatic, radar_constants};
 #[cfg(feature = "run")]

@@ -2,10 +2,10 @@
 
 use std::error::Error;
 
+use gyre_contract::StageId;
 use gyre_masking::networks::runtime::{INSTALL, RuntimeError};
 use gyre_masking::{MaskKind, MaskingConfig, model::Card};
-use gyre_messages::StageId;
-use gyre_odometry::OdometryConfig;
+use gyre_matching::odometry::OdometryConfig;
 
 use crate::configuration::Configuration;
 

@@ -1,9 +1,9 @@
 //! The settings that decide the computed result.
 
 use gyre_datasets::DatasetOptions;
+use gyre_geometry::samples::GnssConfig;
+use gyre_matching::odometry::OdometryConfig;
 use gyre_objects::ObjectsConfig;
-use gyre_odometry::OdometryConfig;
-use gyre_samples::GnssConfig;
 use gyre_slam::SlamConfig;
 use serde::Serialize;
 use toml::Table;

@@ -45,7 +45,7 @@ impl Named {
     /// As [`read`](Self::read), with this folder as the current one. `None`: it is not searched.
     pub fn read_in(named: &Path, here: Option<PathBuf>) -> Result<Self, ConfigurationError> {
         let own = shipped(named);
-        let mut table = match own.as_deref().and_then(gyre_shipped::text) {
+        let mut table = match own.as_deref().and_then(gyre_storage::shipped::text) {
             Some(text) => strict::parse(named, text)?,
             None if is_name(named) && !named.exists() => return Err(unknown(named)),
             None => strict::read_table(named)?,
@@ -58,12 +58,12 @@ impl Named {
         let mut notes = Vec::new();
         visit(&mut table, |path, key| {
             let written = Path::new(path.as_str());
-            if path.is_empty() || written.is_absolute() || gyre_shipped::is_own(written) {
+            if path.is_empty() || written.is_absolute() || gyre_storage::shipped::is_own(written) {
                 return Ok(());
             }
             let beside = folder.map(|folder| folder.join(written));
             let is_beside = |path: &PathBuf| key == RECORDING || path.exists();
-            let own = || gyre_shipped::find(written);
+            let own = || gyre_storage::shipped::find(written);
             let found = beside.clone().filter(is_beside).or_else(own);
             let here = here.as_deref().map(|here| here.join(written));
             match (found, here.filter(|here| here.exists())) {
@@ -103,7 +103,7 @@ impl Named {
 pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
     visit(table, |path, key| {
         let written = Path::new(path.as_str());
-        if path.is_empty() || gyre_shipped::is_own(written) {
+        if path.is_empty() || gyre_storage::shipped::is_own(written) {
             return Ok(());
         }
         let found = match written.exists() {
@@ -111,7 +111,7 @@ pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
             true if key.ends_with(".command") => std::path::absolute(written).ok(),
             true if key != RECORDING => written.canonicalize().ok(),
             _ if key == RECORDING => std::path::absolute(written).ok(),
-            _ => gyre_shipped::find(written),
+            _ => gyre_storage::shipped::find(written),
         };
         found.map_or(Ok(()), |found| put(path, found))
     })
@@ -154,21 +154,23 @@ fn visit(
 
 /// Returns the path of the configuration of the program that is meant: where there is no such file.
 pub fn shipped(named: &Path) -> Option<PathBuf> {
-    if gyre_shipped::is_own(named) {
+    if gyre_storage::shipped::is_own(named) {
         return Some(named.to_owned());
     }
     let is_configuration = |path: &PathBuf| path.extension().is_some_and(|it| it == "toml");
-    let find = || gyre_shipped::find(named).filter(is_configuration);
+    let find = || gyre_storage::shipped::find(named).filter(is_configuration);
     match named.is_file() {
         true => None,
-        false => gyre_shipped::configuration(named).or_else(find),
+        false => gyre_storage::shipped::configuration(named).or_else(find),
     }
 }
 
 /// Returns a question for the configuration of the program with the nearest name; empty without a
 /// similar name.
 pub fn suggestion(named: &Path) -> String {
-    let known: Vec<&str> = gyre_shipped::configurations().map(|(it, _)| it).collect();
+    let known: Vec<&str> = gyre_storage::shipped::configurations()
+        .map(|(it, _)| it)
+        .collect();
     strict::suggestion(&named.display().to_string(), &known)
 }
 
@@ -186,7 +188,7 @@ fn is_name(named: &Path) -> bool {
 
 /// Returns whether a file of the program is another than this one.
 fn differs(own: &Path, file: &Path) -> bool {
-    gyre_shipped::bytes(own).is_some_and(|own| {
+    gyre_storage::shipped::bytes(own).is_some_and(|own| {
         let read = gyre_storage::read_bytes(file, own.len() as u64);
         read.ok().as_deref() != Some(own)
     })

@@ -3,11 +3,13 @@
 
 use std::{error::Error, path::Path};
 
+use gyre_contract::run::PlayedFrom;
 use gyre_datasets::{
     Dataset, Fingerprint, GnssLog, OpenError, SampleLog, ScanSamples, check_first_scan,
 };
-use gyre_run::PlayedFrom;
-use gyre_samples::{DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
+use gyre_geometry::samples::{
+    DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind,
+};
 use gyre_simulator::SimulatedDrive;
 
 use crate::configuration::Configuration;

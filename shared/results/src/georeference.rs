@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use gyre_mapping::Origin;
+use gyre_configuration::terminal::Failure;
+use gyre_slam::mapping::Origin;
 use gyre_storage as storage;
-use gyre_terminal::Failure;
 use serde_json::Value;
 
 use crate::out::SUMMARY;

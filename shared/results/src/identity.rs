@@ -7,11 +7,11 @@ use std::{
     path::Path,
 };
 
+use gyre_configuration::terminal::Failure;
 use gyre_configuration::{Configuration, difference, fingerprint, with_stored_options};
+use gyre_contract::run::BEGUN_WITH;
 use gyre_datasets::{DatasetOptions, Fingerprint};
-use gyre_run::BEGUN_WITH;
 use gyre_storage as storage;
-use gyre_terminal::Failure;
 use serde::{Deserialize, Serialize};
 
 use crate::out::Out;

@@ -3,13 +3,13 @@
 
 use std::{fmt, num::NonZeroUsize};
 
-use gyre_evaluation::{
+use crate::evaluation::{
     Bands, Coverage, Evaluation, EvaluationError, MatchedMotions, Nees, NeesOptions, STEP,
     TimedMotion, TimedPoses, bands, nees,
     plot::{bands_svg, errors_svg, trajectory_svg},
 };
+use gyre_configuration::terminal::{Failure, print};
 use gyre_radar::{ClockOffset, MAX_OFFSET_S, Trajectory, clock_offset};
-use gyre_terminal::{Failure, print};
 use serde::Serialize;
 
 /// The evaluation with the NEES of its covariances. `Display` is a table, the alternate form a
@@ -120,7 +120,7 @@ pub fn judge_by(
     truth: &Trajectory,
     step: NonZeroUsize,
 ) -> Result<Evaluation, EvaluationError> {
-    gyre_evaluation::evaluate(timed(estimate), timed(truth), step)
+    crate::evaluation::evaluate(timed(estimate), timed(truth), step)
 }
 
 pub fn judge_motions(

@@ -3,6 +3,7 @@
 //! ([`evaluate`]).
 
 pub mod evaluate;
+pub mod evaluation;
 pub mod figures;
 mod georeference;
 mod identity;

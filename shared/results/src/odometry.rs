@@ -4,8 +4,8 @@ mod read;
 
 use std::fmt::Write;
 
-use gyre_evaluation::TimedMotion;
-use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
+use crate::evaluation::TimedMotion;
+use gyre_contract::{PoseHeader, flag, initial_guess, outcome};
 
 pub use read::read;
 

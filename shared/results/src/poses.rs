@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use gyre_messages::PoseHeader;
+use gyre_contract::PoseHeader;
 
 use crate::odometry;
 

@@ -13,13 +13,13 @@ mod slam;
 
 use std::path::{Path, PathBuf};
 
+use crate::evaluation::{NeesOptions, plot::bands_svg};
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::StageId;
 use gyre_datasets::ground_truth::{find_ground_truth, read_trajectory};
-use gyre_evaluation::{NeesOptions, plot::bands_svg};
 use gyre_journal as journal;
-use gyre_messages::StageId;
 use gyre_radar::Trajectory;
-use gyre_terminal::{Failure, print};
 
 use crate::{
     judgement::{Judgement, judge, judge_motions, note_time_offset},

@@ -9,10 +9,10 @@ mod slam;
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
+use gyre_contract::run::latency::{Latency, Percentiles};
+use gyre_contract::run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
+use gyre_contract::{Footprint, StageId};
 use gyre_masking::{MaskKind, MaskingConfig};
-use gyre_messages::{Footprint, StageId};
-use gyre_run::latency::{Latency, Percentiles};
-use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
 use serde::Serialize;
 use serde_json::{Value, json};
 

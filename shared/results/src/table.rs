@@ -7,7 +7,7 @@ use std::{
 };
 
 use csv::{Reader, ReaderBuilder, Trim};
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 
 /// The longest line, bytes: several times the length of a full row.
 const LONGEST_LINE: usize = 1 << 16;

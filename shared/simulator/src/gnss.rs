@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use gyre_samples::{Geographic, LocalPlane, RawFix};
+use gyre_geometry::samples::{Geographic, LocalPlane, RawFix};
 use nalgebra::Vector2;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;

@@ -6,8 +6,8 @@ mod render_ahead;
 use std::path::PathBuf;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
+use gyre_geometry::samples::{RawFix, Sample};
 use gyre_radar::{OwnedScan, ScanSlot};
-use gyre_samples::{RawFix, Sample};
 
 use crate::cars;
 use crate::config::SimulationConfig;

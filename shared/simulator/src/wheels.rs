@@ -1,7 +1,7 @@
 use std::fmt::Write as _;
 
 use gyre_geometry::Twist;
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -17,6 +17,7 @@ mod log;
 mod quoted;
 #[cfg(feature = "record")]
 pub mod record;
+pub mod shipped;
 
 use std::{
     io,

@@ -3,7 +3,7 @@
 
 use std::{env, fs, thread, time::Duration};
 
-use gyre_messages::{
+use gyre_contract::{
     Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
 };
 use gyre_stage::{Launch, StageCounters, StageError, clock, run::STANDBY, writer::TopicWriter};

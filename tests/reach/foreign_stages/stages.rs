@@ -3,12 +3,12 @@
 use std::{env, path::Path, thread, time::Duration};
 
 use bytemuck::Pod;
-use gyre_datasets::{Dataset, DatasetOptions};
-use gyre_messages::{
+use gyre_contract::run::SourceConfig;
+use gyre_contract::{
     Item, Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined,
     Rotation, Scan, ScanHeader, StageId, compose, flag,
 };
-use gyre_run::SourceConfig;
+use gyre_datasets::{Dataset, DatasetOptions};
 use gyre_stage::{
     Launch, Sink, Source, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView, PairView, Pairs},

@@ -8,7 +8,7 @@ use std::{
     sync::{Arc, Mutex, OnceLock},
 };
 
-use gyre_messages::FollowerId;
+use gyre_contract::FollowerId;
 use gyre_simulator::{GyroProfile, OutputFormat, Profile, SimulationConfig};
 use serde_json::Value;
 

@@ -6,8 +6,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_contract::FollowerId;
 use gyre_journal::{self as journal, checkpoint};
-use gyre_messages::FollowerId;
 use gyre_slam::{Keyframe, Place, Query, records_path};
 use rand::{
     Rng,

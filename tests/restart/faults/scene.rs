@@ -2,8 +2,8 @@
 
 use std::{thread, time::Duration};
 
+use gyre_contract::flag;
 use gyre_journal as journal;
-use gyre_messages::flag;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustix::process::Signal;

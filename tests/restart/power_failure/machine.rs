@@ -7,6 +7,9 @@ use gyre::{
     program,
 };
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::Ending;
+use gyre_contract::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag};
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
@@ -14,12 +17,9 @@ use gyre_journal::{
     checkpoint::{self, Checkpoint},
     keyframes::Keyframes,
 };
-use gyre_messages::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag};
+use gyre_matching::Refiner;
 use gyre_results::{Identity, Out, Programs, Session};
-use gyre_run::Ending;
-use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, records_path};
-use gyre_terminal::Failure;
 use nalgebra::{Isometry2, Vector2};
 
 /// Scans of the drive: three groups of synchronised changes.

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use gyre_datasets::write_tum;
-use gyre_estimation::{Constraint, G2o};
+use gyre_slam::estimation::{Constraint, G2o};
 use gyre_geometry::pose;
-use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, Trajectory};
 use gyre_slam::localisation::{DriveSearch, Localiser, Map};
 use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose};

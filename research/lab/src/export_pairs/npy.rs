@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 
 use crate::report::cannot_write;
 

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use gyre_configuration::Configuration;
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use serde_json::json;
 use toml::Table;
 

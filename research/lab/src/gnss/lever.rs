@@ -1,6 +1,6 @@
 //! The lever arm of the antenna, by the fixes of a drive that turns.
 
-use gyre_estimation::{Position, align};
+use gyre_slam::estimation::{Position, align};
 use gyre_geometry::Pose;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 

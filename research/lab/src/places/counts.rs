@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, time::Duration};
 
-use gyre_estimation::places::{Candidate, Descriptor, VerificationOutcome};
+use gyre_slam::estimation::places::{Candidate, Descriptor, VerificationOutcome};
 
 use super::Checked;
 use crate::{

@@ -6,7 +6,7 @@ use gyre_geometry::UncertainMotion;
 use gyre_radar::Trajectory;
 use gyre_results::judgement::judge;
 use gyre_slam::{LoopCandidate, Query, TrajectoryEstimator};
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use serde_json::json;
 
 use crate::{

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gyre_estimation::Constraint;
+use gyre_slam::estimation::Constraint;
 use gyre_geometry::{UncertainMotion, pose};
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};

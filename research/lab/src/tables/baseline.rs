@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, process::Command};
 
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use serde::Deserialize;
 
 use crate::{cli::TablesArguments, sequence::Sequence};

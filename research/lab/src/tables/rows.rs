@@ -92,7 +92,7 @@ mod tests {
     use std::{collections::BTreeSet, path::Path};
 
     use gyre_configuration::Configuration;
-    use gyre_scan_matching::RefinementKind;
+    use gyre_matching::RefinementKind;
     use serde_json::{Value, json};
 
     use super::*;

@@ -2,7 +2,7 @@
 //! them, on one thread of this process.
 
 use gyre_radar::OwnedScan;
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use serde_json::json;
 
 use super::{

@@ -1,6 +1,6 @@
 //! The gyro: the section `[simulation.gyro]`.
 
-use gyre_samples::UpAxis;
+use gyre_geometry::samples::UpAxis;
 use serde::{Deserialize, Serialize};
 
 use super::{GyroFigures, GyroProfile};

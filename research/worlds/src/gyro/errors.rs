@@ -1,6 +1,6 @@
 //! The errors of a gyro: noise, bias, scale, misalignment, steps.
 
-use gyre_samples::UpAxis;
+use gyre_geometry::samples::UpAxis;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;

@@ -1,5 +1,5 @@
 #![allow(clippy::unwrap_used)]
-use gyre_samples::{Sample, UpAxis};
+use gyre_geometry::samples::{Sample, UpAxis};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 

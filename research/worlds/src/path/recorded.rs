@@ -94,7 +94,7 @@ pub fn read_in(
 
 /// Reads a file, or one of the program.
 fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    match gyre_shipped::text(path) {
+    match gyre_storage::shipped::text(path) {
         Some(text) => parse_trajectory(text, path),
         None => read_trajectory(path),
     }

@@ -2,7 +2,7 @@
 
 use gyre_datasets::open_source;
 use gyre_radar::{DopplerEstimator, NoDoppler, OwnedScan, PointsConfig};
-use gyre_samples::DopplerVelocity;
+use gyre_geometry::samples::DopplerVelocity;
 use gyre_worlds::{OutputFormat, Profile, Realism, SimulatedDrive, SimulationConfig};
 use nalgebra::{Matrix2, Vector2};
 

@@ -4,7 +4,7 @@
 use std::{fs, path::Path};
 
 use gyre_datasets::open_source;
-use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
 use gyre_worlds::{SimulatedDrive, SimulationConfig};
 

@@ -2,7 +2,7 @@
 
 use gyre_datasets::{DatasetOptions, LostAzimuthOption, open_source};
 use gyre_geometry::Pose;
-use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
 use gyre_worlds::{OutputFormat, Profile, SimulatedDrive, SimulationConfig};
 

@@ -5,10 +5,10 @@ use std::{fmt::Write as _, path::Path};
 
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
 use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw};
-use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
-use gyre_samples::{DopplerKind, GyroKind, WheelsKind};
-use gyre_scan_matching::InitialGuess;
+use gyre_geometry::samples::{DopplerKind, GyroKind, WheelsKind};
+use gyre_matching::InitialGuess;
 use gyre_worlds::{
     GyroProfile, OutputFormat, Profile, SimulatedDrive, SimulationConfig, TunnelConfig,
     drive::DriveConfig,

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use clap::{Args, Subcommand};
-use gyre_terminal::seconds;
+use gyre_configuration::terminal::seconds;
 
 /// The ends of a link.
 #[derive(Debug, Subcommand)]

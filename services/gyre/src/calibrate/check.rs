@@ -2,12 +2,12 @@
 
 use gyre_calibration::{Found, toml};
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::Failure;
 use gyre_datasets::{DatasetOptions, ground_truth::read_trajectory};
-use gyre_odometry::Odometry;
+use gyre_geometry::samples::{GyroKind, WheelsKind};
+use gyre_matching::odometry::Odometry;
 use gyre_radar::{OwnedScan, Trajectory};
 use gyre_results::{judgement::judge, truth_of};
-use gyre_samples::{GyroKind, WheelsKind};
-use gyre_terminal::Failure;
 
 use super::CalibrateArguments;
 

@@ -7,9 +7,9 @@ use gyre_calibration::{
     ClockError, Drive, GyroCalibration, WheelCalibration, calibrate_gyro, calibrate_wheels,
 };
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::SampleLog;
-use gyre_samples::{GyroConfig, GyroKind, WheelsConfig};
-use gyre_terminal::{Failure, print};
+use gyre_geometry::samples::{GyroConfig, GyroKind, WheelsConfig};
 
 use super::Section;
 

@@ -1,7 +1,7 @@
 //! The help: commands in groups, each with examples.
 
 use clap::{Arg, Command, CommandFactory};
-use gyre_terminal::{WIDTH, wrap};
+use gyre_configuration::terminal::{WIDTH, wrap};
 
 use super::Gyre;
 

@@ -4,12 +4,12 @@
 
 use std::{ffi::OsStr, fs, path::Path};
 
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::flag;
+use gyre_contract::run::COMPLETE;
 use gyre_journal::{self as journal, JournalError};
-use gyre_messages::flag;
 use gyre_results::{Out, REPLACED as ASIDE, SIMULATED_TRUTH};
-use gyre_run::COMPLETE;
 use gyre_storage::{self as storage, StorageError};
-use gyre_terminal::{Failure, print};
 
 use super::{CONFIGURATION, is_complete, state};
 
@@ -141,8 +141,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::ops::Range;
 
+    use gyre_contract::{Item, PoseHeader};
     use gyre_journal::Journal;
-    use gyre_messages::{Item, PoseHeader};
     use tempfile::TempDir;
 
     use super::{super::make_way, *};

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use gyre_configuration::terminal::inputs::Given;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_configuration::{Configuration, calibration, strict::path_value};
+use gyre_contract::run::PlayedFrom;
 use gyre_results::absolute;
-use gyre_run::PlayedFrom;
-use gyre_terminal::inputs::Given;
-use gyre_terminal::{Failure, print};
 
 use super::results_folder;
 use crate::arguments::RunArguments;

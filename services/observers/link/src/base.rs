@@ -13,8 +13,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, Message as _, Motion, Pose, flag, topic};
-use gyre_run::{LinkConfig, PlayedFrom, Side};
+use gyre_contract::run::{LinkConfig, PlayedFrom, Side};
+use gyre_contract::{Item, Message as _, Motion, Pose, flag, topic};
 use gyre_stage::{Launch, StageCounters, StageError, relay::FirstStages, source::RecordedMessage};
 use zenoh::{
     Session, Wait,

@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, flag};
+use gyre_contract::{Item, flag};
 use gyre_stage::{StageError, source::RecordedMessage};
 use zenoh::{
     Session, Wait,

@@ -3,8 +3,8 @@
 
 use std::{fs, path::Path, thread, time::Duration};
 
-use gyre_messages::{Limits, topic};
-use gyre_run::{BEGUN_WITH, LinkConfig, Side};
+use gyre_contract::run::{BEGUN_WITH, LinkConfig, Side};
+use gyre_contract::{Limits, topic};
 use gyre_stage::{Manifest, StageError};
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};

@@ -2,7 +2,7 @@
 
 use std::net::IpAddr;
 
-use gyre_run::LinkConfig;
+use gyre_contract::run::LinkConfig;
 use gyre_stage::StageError;
 
 /// The environment variable, and its value, that make zenoh do all its work in one thread.

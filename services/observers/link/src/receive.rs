@@ -11,9 +11,9 @@ use std::{
     time::Duration,
 };
 
+use gyre_contract::run::LinkConfig;
+use gyre_contract::topic;
 use gyre_journal::{self as journal, Journal};
-use gyre_messages::topic;
-use gyre_run::LinkConfig;
 use gyre_stage::{Manifest, StageError, launch, wake::Signals};
 use gyre_supervise::rig::Rig;
 use zenoh::{Session, Wait};

@@ -7,15 +7,15 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_contract::{Hop, MotionHeader, PoseHeader, StageId, flag};
 use gyre_journal::{self as journal, loops::LoggedLoops};
-use gyre_messages::{Hop, MotionHeader, PoseHeader, StageId, flag};
 use gyre_stage::{StageError, source::RecordedMessage};
 
 /// A message on its way: the bytes of its header, then the bytes of its payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub seq: u64,
-    /// See [`Item::generation`](gyre_messages::Item::generation).
+    /// See [`Item::generation`](gyre_contract::Item::generation).
     pub generation: u32,
     pub bytes: Arc<[u8]>,
 }

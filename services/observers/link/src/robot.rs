@@ -7,11 +7,11 @@
 use std::{collections::VecDeque, sync::Arc, thread};
 
 use bytemuck::Pod;
-use gyre_journal::{self as journal, Journal};
-use gyre_messages::{
+use gyre_contract::run::{LinkConfig, PlayedFrom, Side};
+use gyre_contract::{
     Hop, Item, Masked, Message as _, Motion, MotionHeader, Pose, PoseHeader, StageId, flag,
 };
-use gyre_run::{LinkConfig, PlayedFrom, Side};
+use gyre_journal::{self as journal, Journal};
 use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority};
 
@@ -309,7 +309,7 @@ impl Robot<'_> {
     }
 
     /// Returns the header of a message from the network, if it is valid for its topic.
-    fn checked<M: gyre_messages::Message<Header = H>, H: Pod>(
+    fn checked<M: gyre_contract::Message<Header = H>, H: Pod>(
         &self,
         bytes: &[u8],
     ) -> Result<H, StageError> {

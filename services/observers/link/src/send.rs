@@ -14,11 +14,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_journal::{self as journal, loops::LoggedLoops};
-use gyre_messages::{
+use gyre_contract::run::LinkConfig;
+use gyre_contract::{
     Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Window, topic,
 };
-use gyre_run::LinkConfig;
+use gyre_journal::{self as journal, loops::LoggedLoops};
 use gyre_stage::{
     Manifest, StageError, launch,
     observer::{ObservedRun, TopicObserver, wait_for_any},

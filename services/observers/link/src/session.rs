@@ -6,7 +6,7 @@ use std::{
     thread,
 };
 
-use gyre_run::LinkConfig;
+use gyre_contract::run::LinkConfig;
 use gyre_stage::StageError;
 use serde_json::{Value, json};
 use zenoh::{Config, Session, Wait};

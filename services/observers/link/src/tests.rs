@@ -12,8 +12,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, flag};
-use gyre_run::LinkConfig;
+use gyre_contract::run::LinkConfig;
+use gyre_contract::{Item, flag};
 use gyre_stage::source::RecordedMessage;
 use zenoh::{Session, Wait, qos::Priority};
 

@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use gyre_messages::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader};
+use gyre_contract::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader};
 use gyre_ros2_messages::{
     nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
     visualization_msgs::MarkerArray,

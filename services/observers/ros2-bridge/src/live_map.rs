@@ -7,8 +7,8 @@ use std::{
 };
 
 use gyre_geometry::Pose;
-use gyre_mapping::{Evidence, grid};
 use gyre_ros2_messages::{frames::occupancy_grid, nav_msgs::OccupancyGrid};
+use gyre_slam::mapping::{Evidence, grid};
 use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator};
 use gyre_stage::{clock, observer::ObservedRun};
 

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_mapping::MapOptions;
 use gyre_ros2_messages::{Domain, Vehicle};
 use gyre_slam::EstimatorKind;
+use gyre_slam::mapping::MapOptions;
 
 #[derive(Clone, Debug)]
 pub struct Settings {

@@ -10,10 +10,12 @@ mod wakeups;
 
 use std::time::Duration;
 
+use gyre_contract::run::SourceConfig;
 use gyre_datasets::DatasetOptions;
+use gyre_geometry::samples::{
+    GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind,
+};
 use gyre_ros2_messages::Domain;
-use gyre_run::SourceConfig;
-use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
 

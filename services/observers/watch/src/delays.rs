@@ -1,6 +1,6 @@
 //! Delays of the last minute.
 
-use gyre_messages::{Item, StageId};
+use gyre_contract::{Item, StageId};
 use serde_json::{Value, json};
 
 const WINDOW_NS: i64 = 60_000_000_000;
@@ -72,7 +72,7 @@ fn at(mut delays_ns: Vec<i64>, shares: [f64; 2]) -> Option<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::Hop;
+    use gyre_contract::Hop;
 
     use super::*;
 

@@ -1,6 +1,6 @@
 //! The delays of all poses, in buckets as Prometheus counts them.
 
-use gyre_messages::{Item, StageId};
+use gyre_contract::{Item, StageId};
 use prometheus_client::metrics::{family::Family, histogram::Histogram};
 
 const HOP_BUCKETS_S: [f64; 15] = [

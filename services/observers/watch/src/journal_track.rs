@@ -4,8 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
+use gyre_contract::PoseHeader;
 use gyre_journal as journal;
-use gyre_messages::PoseHeader;
 
 /// Poses that are read at once: about a megabyte.
 const PART: usize = 2000;
@@ -53,8 +53,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::fs;
 
+    use gyre_contract::Item;
     use gyre_journal::Journal;
-    use gyre_messages::Item;
 
     use super::*;
 

@@ -19,6 +19,7 @@ mod page;
 mod pictures;
 mod processes;
 mod recent_drift;
+pub mod recorder;
 mod run_view;
 mod server;
 mod stream;

@@ -1,6 +1,6 @@
 //! The layers that a browser asks for, and the messages to it in JSON.
 
-use gyre_messages::{
+use gyre_contract::{
     ListedObject, ObjectsHeader, PoseHeader, SampleHealth, WitnessCounts, outcome,
 };
 use serde::Serialize;

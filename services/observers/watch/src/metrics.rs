@@ -9,7 +9,7 @@ use prometheus_client::{
     registry::{Registry, Unit},
 };
 
-use gyre_messages::Basis;
+use gyre_contract::Basis;
 
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
@@ -149,7 +149,7 @@ impl Snapshot {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Hop, Item, PoseHeader, StageId, flag, gyro, outcome, wheels};
+    use gyre_contract::{Hop, Item, PoseHeader, StageId, flag, gyro, outcome, wheels};
     use gyre_stage::source::Received;
 
     use super::*;
@@ -262,7 +262,7 @@ mod tests {
             ..Process::default()
         };
         let mut counts = view.counts();
-        counts.samples = gyre_messages::SampleHealth {
+        counts.samples = gyre_contract::SampleHealth {
             gyro: 2080,
             left_out: 3,
             gyro_hz: Some(208.0),

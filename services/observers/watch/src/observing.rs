@@ -8,7 +8,7 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws};
-use gyre_messages::{Masked, Message, Objects, Pose, PoseHeader, Scan};
+use gyre_contract::{Masked, Message, Objects, Pose, PoseHeader, Scan};
 use gyre_stage::{
     StageError,
     observer::{Next, ObservedRun},

@@ -1,8 +1,8 @@
 //! Scans, rasters and points, made small for a browser.
 
 use axum::body::Bytes;
+use gyre_contract::MaskedHeader;
 use gyre_geometry::SparsePoint;
-use gyre_messages::MaskedHeader;
 use gyre_radar::{PolarScan, Sense};
 use ndarray::ArrayView2;
 use serde_json::json;

@@ -3,8 +3,8 @@
 
 use std::collections::VecDeque;
 
+use gyre_contract::{PoseHeader, flag};
 use gyre_geometry::{ComposedMotion, OdometryMotion};
-use gyre_messages::{PoseHeader, flag};
 use serde::Serialize;
 
 const STRETCH_M: f64 = 100.0;

@@ -6,7 +6,7 @@ use std::{
 };
 
 use axum::extract::ws::Message;
-use gyre_messages::{
+use gyre_contract::{
     Message as _, Objects, ObjectsHeader, Pose, PoseHeader, SampleRates, Scan, ScanHeader,
     WitnessCounts, flag,
 };
@@ -323,8 +323,8 @@ fn send_json(channel: &Newest, message: &impl Serialize) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use gyre_contract::{Item, ListedObject, MaskedHeader, StageId};
     use gyre_geometry::SparsePoint;
-    use gyre_messages::{Item, ListedObject, MaskedHeader, StageId};
     use serde_json::Value;
 
     use super::*;

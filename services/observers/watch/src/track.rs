@@ -1,6 +1,6 @@
 //! The trajectory as it is drawn: fewer vertices where it is long.
 
-use gyre_messages::PoseHeader;
+use gyre_contract::PoseHeader;
 use serde::Serialize;
 
 /// The most vertices. With one more, the distance between them doubles.

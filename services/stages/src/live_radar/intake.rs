@@ -3,8 +3,8 @@
 use std::{fmt::Display, time::Duration};
 
 use gyre_colossus::{Azimuth, BadConfiguration, Configuration};
+use gyre_contract::ScanHeader;
 use gyre_datasets::DatasetOptions;
-use gyre_messages::ScanHeader;
 use gyre_stage::source::Received;
 use thiserror::Error;
 

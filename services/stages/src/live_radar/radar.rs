@@ -3,7 +3,7 @@
 use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_colossus::{Configuration, Event, Health, HealthStatus, Message};
-use gyre_messages::{ScanHeader, StageId};
+use gyre_contract::{ScanHeader, StageId};
 use gyre_stage::{
     StageError, clock,
     source::{Arrival, Received as Counts, Sensor},

@@ -5,8 +5,8 @@ use std::time::Duration;
 use gyre_colossus::{
     Azimuth, BadConfiguration, Configuration, FoundClock, RadarClock, SweepAssembler,
 };
+use gyre_contract::ScanHeader;
 use gyre_datasets::DatasetOptions;
-use gyre_messages::ScanHeader;
 use gyre_stage::{clock, source::LastScan};
 
 use crate::live_radar::{read_delay::ReadDelay, turn_counter::TurnCounter};

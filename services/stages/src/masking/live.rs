@@ -5,9 +5,9 @@
 
 use std::{collections::VecDeque, mem};
 
-use gyre_messages::{Item, NumberedBy, Scan, Window, flag};
+use gyre_contract::{Item, NumberedBy, Scan, Window, flag};
+use gyre_geometry::samples::Sample;
 use gyre_radar::continues;
-use gyre_samples::Sample;
 use gyre_stage::{
     Generation, Launch, Listener, Manifest, StageError,
     inputs::Action,

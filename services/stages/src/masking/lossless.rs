@@ -1,7 +1,7 @@
 //! The queue of masking, and lossless mode: every scan, in order.
 
-use gyre_messages::{Item, Scan, Window, flag};
-use gyre_samples::Sample;
+use gyre_contract::{Item, Scan, Window, flag};
+use gyre_geometry::samples::Sample;
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::Action,

@@ -4,8 +4,8 @@
 
 use std::collections::BTreeMap;
 
+use gyre_contract::{Item, Motion, MotionEstimate, flag};
 use gyre_geometry::Twist;
-use gyre_messages::{Item, Motion, MotionEstimate, flag};
 use gyre_radar::LostAzimuths;
 use gyre_stage::{Launch, Listener, StageError, reader::Port, source::Credit};
 

@@ -1,9 +1,9 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
+use gyre_contract::{Item, Scan, Window, flag};
 use gyre_geometry::Twist;
-use gyre_messages::{Item, Scan, Window, flag};
+use gyre_geometry::samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate};
 use gyre_radar::LostAzimuths;
-use gyre_samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate};
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::{Action, Inputs},

@@ -1,9 +1,9 @@
 //! Faults to inject into the played scans: `source.faults`.
 
+use gyre_contract::ScanHeader;
+use gyre_contract::run::{PlayedFault, PlayedFaultKind};
 use gyre_datasets::ScanSamples;
-use gyre_messages::ScanHeader;
-use gyre_run::{PlayedFault, PlayedFaultKind};
-use gyre_samples::{Sample, SampleKind};
+use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_stage::StageError;
 
 #[derive(Clone, Debug)]

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use gyre_contract::run::SourceConfig;
 use gyre_recording::Recording;
-use gyre_run::SourceConfig;
 use gyre_stage::{
     Launch, StageCounters, StageError,
     source::{RecordedMessage, run_player},

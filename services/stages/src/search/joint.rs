@@ -2,9 +2,9 @@
 //! scans over every angle (Masking by Moving; `raw` in Weston et al., Table III). It replaces both
 //! stages of the decoupled search.
 
-use gyre_messages::{Masked, Motion, MotionEstimate, StageId};
+use gyre_contract::{Masked, Motion, MotionEstimate, StageId};
+use gyre_matching::{ExhaustiveConfig, ExhaustiveSearch};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{PairView, Pairs},

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use gyre_messages::{Header, Masked};
+use gyre_contract::{Header, Masked};
+use gyre_matching::{MotionMatch, RotationMatch};
 use gyre_radar::RasterConfig;
-use gyre_scan_matching::{MotionMatch, RotationMatch};
 use gyre_stage::python_function::{Argument, Array, Function, Returned, Scan};
 use gyre_stage::{Launch, StageError, inputs::PairView};
 use nalgebra::matrix;

@@ -1,9 +1,9 @@
 //! The rotation-search stage: the rotation between consecutive scans from their magnitude spectra
 //! (Weston et al., Sec. III-C, step 1).
 
-use gyre_messages::{Masked, Rotation, RotationEstimate, StageId};
+use gyre_contract::{Masked, Rotation, RotationEstimate, StageId};
+use gyre_matching::{RotationConfig, RotationMatch, SequentialRotation};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{RotationConfig, RotationMatch, SequentialRotation};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{PairView, Pairs},

@@ -1,9 +1,9 @@
 //! The translation-search stage: the translation between consecutive scans once their rotation is
 //! known (Weston et al., Eq. 8).
 
-use gyre_messages::{Masked, Motion, MotionEstimate, Rotation, StageId};
+use gyre_contract::{Masked, Motion, MotionEstimate, Rotation, StageId};
+use gyre_matching::{MotionMatch, RotationMatch, TranslationConfig, TranslationSearch};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{MotionMatch, RotationMatch, TranslationConfig, TranslationSearch};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView, PairView},

@@ -10,9 +10,9 @@ use std::{
     time::Duration,
 };
 
+use gyre_configuration::terminal::{Failure, own, print};
 use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::last_line;
-use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::batch::{Drive, End, List, Outcome, Row};
@@ -134,8 +134,8 @@ fn command(list: &List, out: &Path, drive: &Drive) -> Command {
     let configuration = drive.configuration.as_deref();
     let configuration = configuration.map(|named| match list.resolve(named) {
         file if file.is_file() => file,
-        _ if gyre_shipped::is_own(named) => named.to_owned(),
-        file => gyre_shipped::configuration(named).unwrap_or(file),
+        _ if gyre_storage::shipped::is_own(named) => named.to_owned(),
+        file => gyre_storage::shipped::configuration(named).unwrap_or(file),
     });
     let mut command = Command::new(own());
     command.arg(COMMAND);

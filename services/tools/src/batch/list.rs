@@ -7,8 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_configuration::terminal::Failure;
 use gyre_datasets::is_dataset;
-use gyre_terminal::Failure;
 use serde::{Deserialize, Serialize};
 
 /// The largest list that is read, bytes: a million lines of 256.

@@ -5,9 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::COMPLETE;
 use gyre_results::HARDLY_MEASURED;
-use gyre_run::COMPLETE;
-use gyre_terminal::Failure;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

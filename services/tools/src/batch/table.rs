@@ -3,10 +3,10 @@
 
 use std::{collections::BTreeMap, fmt::Display, path::Path};
 
+use gyre_configuration::terminal::Failure;
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_evaluation::path_m;
+use gyre_results::evaluation::path_m;
 use gyre_storage::{SETTINGS, read_text};
-use gyre_terminal::Failure;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
@@ -78,7 +78,7 @@ pub(crate) fn values(out: &Path) -> Result<(Values, Option<String>), String> {
     let trajectory = read_trajectory(&out.join("trajectory.tum")).ok();
     let trajectory = trajectory.filter(|it| it.poses.len() > 1);
     let span_ns = trajectory.as_ref().and_then(|it| it.span_ns());
-    let begun = read_text(&out.join(gyre_run::BEGUN_WITH), SETTINGS).ok();
+    let begun = read_text(&out.join(gyre_contract::run::BEGUN_WITH), SETTINGS).ok();
     let begun: Option<toml::Table> = begun.and_then(|text| text.parse().ok());
     let build = |begun: &toml::Table| {
         let build = begun.get("programs")?.get("build")?.as_str()?;

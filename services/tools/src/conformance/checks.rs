@@ -7,9 +7,9 @@ mod stream;
 
 use std::time::{Duration, Instant};
 
-use gyre_messages::{StageId, flag};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{StageId, flag};
 use gyre_supervise::rig::Recorded;
-use gyre_terminal::Failure;
 
 use crate::conformance::{
     item::work_ns,

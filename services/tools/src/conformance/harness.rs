@@ -3,13 +3,13 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
-use gyre_messages::{Item, Pose, PoseHeader, StageId, flag};
+use gyre_configuration::terminal::own;
+use gyre_contract::{Item, Pose, PoseHeader, StageId, flag};
 use gyre_stage::{Manifest, StageError, wake::Signals, writer::TopicWriter};
 use gyre_supervise::{
     Death, Scheduling, SuperviseError,
     rig::{Process, Recorded, Rig, Tap},
 };
-use gyre_terminal::own;
 
 use crate::conformance::topics::StageTopics;
 

@@ -1,6 +1,6 @@
 //! The item of a message that a stage has sent: the fields copied from its input, and its own hop.
 
-use gyre_messages::{Item, StageId, flag};
+use gyre_contract::{Item, StageId, flag};
 
 /// Returns the fields of an output's item that a stage has to copy from its input and has not.
 pub(crate) fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static str> {

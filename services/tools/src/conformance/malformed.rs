@@ -1,6 +1,6 @@
 //! Inputs that break the contract, and that each reader has to refuse.
 
-use gyre_messages::{Masked, Message, Motion, Pose, Rotation, Scan};
+use gyre_contract::{Masked, Message, Motion, Pose, Rotation, Scan};
 use gyre_stage::StageError;
 use gyre_supervise::rig::Recorded;
 

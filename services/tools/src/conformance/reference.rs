@@ -6,11 +6,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, Message, Motion, Pose, PoseHeader, StageId, compose, flag};
-use gyre_run::StageConfig;
+use gyre_configuration::terminal::{Failure, own};
+use gyre_contract::run::StageConfig;
+use gyre_contract::{Item, Message, Motion, Pose, PoseHeader, StageId, compose, flag};
 use gyre_stage::{StageError, wake::Signals, writer::TopicWriter};
 use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
-use gyre_terminal::{Failure, own};
 
 use crate::conformance::{Test, harness::start_of_trajectory, topics::StageTopics};
 

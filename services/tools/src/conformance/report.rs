@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use gyre_run::latency::Durations;
+use gyre_contract::run::latency::Durations;
 use serde::Serialize;
 
 use crate::conformance::rule::{Judged, Verdict};

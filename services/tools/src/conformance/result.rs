@@ -1,11 +1,11 @@
 //! The result in a message: its bytes, and the differences of results.
 
 use bytemuck::{cast_slice, pod_read_unaligned};
-use gyre_geometry::wrap_angle;
-use gyre_messages::{
+use gyre_contract::{
     Item, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, Refined, Rotation, Scan,
     ScanHeader, flag,
 };
+use gyre_geometry::wrap_angle;
 use gyre_stage::StageError;
 use gyre_supervise::rig::Recorded;
 use serde::Serialize;

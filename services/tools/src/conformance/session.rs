@@ -9,10 +9,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, Message, Pose, StageId, flag};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{Item, Message, Pose, StageId, flag};
 use gyre_stage::StageError;
 use gyre_supervise::{Death, SuperviseError, rig::Recorded};
-use gyre_terminal::Failure;
 
 use crate::conformance::{
     Demands, Test,

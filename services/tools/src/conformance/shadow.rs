@@ -14,10 +14,10 @@ mod shadowing;
 
 use std::{fs, path::PathBuf, time::Duration};
 
-use gyre_messages::{StageId, Window};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{StageId, Window};
 use gyre_stage::{Manifest, StageError, observer::ObservedRun, wake::Signals};
 use gyre_supervise::Scheduling;
-use gyre_terminal::Failure;
 
 use crate::conformance::Candidate;
 

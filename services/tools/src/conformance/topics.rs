@@ -1,6 +1,6 @@
 //! The topics of each stage.
 
-use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId};
+use gyre_contract::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId};
 use gyre_stage::Manifest;
 
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -8,13 +8,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::{DatasetOptions, Format, LostAzimuthOption, find_ground_truth, stored_options};
 use gyre_radar::{
     LostAzimuths, OwnedScan,
     lost::{repair, stale_rows},
 };
 use gyre_storage::{StorageError, create_folder, write as write_file};
-use gyre_terminal::{Failure, print};
 
 use crate::{
     export::source::{Lost, Scans, Source},

@@ -1,6 +1,7 @@
 //! The scans of a source as messages of Navtech's driver.
 
 use gyre_colossus::Configuration as Radar;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::{ReadError, correct_eccentricity, middle_ns};
 use gyre_radar::{
     OwnedScan, PlacedRows, PolarScan, Sense, SweepGeometry, lost::stale_rows, scan::flag,
@@ -10,7 +11,6 @@ use gyre_ros2_messages::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     radar::{Encoder, ScanMessages},
 };
-use gyre_terminal::{Failure, print};
 
 use crate::{
     export::{

@@ -7,16 +7,16 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::{
+    Correction, CorrectionHeader, ListedObject, Message, Objects, ObjectsHeader, Pose as PoseTopic,
+    PoseHeader, flag,
+};
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
 use gyre_geometry::Pose;
 use gyre_journal::{
     self as journal, JournalError,
     objects::{LoggedObjects, listed},
-};
-use gyre_mapping::grid;
-use gyre_messages::{
-    Correction, CorrectionHeader, ListedObject, Message, Objects, ObjectsHeader, Pose as PoseTopic,
-    PoseHeader, flag,
 };
 use gyre_radar::{LostAzimuths, Trajectory};
 use gyre_recording::{
@@ -25,7 +25,7 @@ use gyre_recording::{
 };
 use gyre_ros2_messages::{Vehicle, frames::occupancy_grid};
 use gyre_slam::RecordReader;
-use gyre_terminal::{Failure, print};
+use gyre_slam::mapping::grid;
 
 use crate::maps::map;
 

@@ -5,11 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
+use gyre_configuration::terminal::Failure;
 use gyre_results::{Content, Out, OutError};
+use gyre_slam::mapping::{Evidence, Origin, require_tiles_only, write_map};
 use gyre_slam::{Keyframe, Record, localisation::Map};
 use gyre_storage::{self as storage, StorageError};
-use gyre_terminal::Failure;
 
 /// The next map while it is written, in the folder of the map.
 const NEXT: &str = ".next";

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use gyre_mapping::encode_png;
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
+use gyre_slam::mapping::encode_png;
 use ndarray::Array2;
 use png::ColorType;
 

@@ -1,13 +1,13 @@
 //! Masks scans one after the other as a run does, and inspects chosen ones.
 
+use gyre_configuration::terminal::{Failure, print};
 use gyre_configuration::{Configuration, Played};
 use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_matching::odometry::{Odometry, OdometryConfig};
+use gyre_matching::{RefinementConfig, RefinementKind};
 use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
-use gyre_scan_matching::{RefinementConfig, RefinementKind};
-use gyre_terminal::{Failure, print};
 use ndarray::Array2;
 
 use crate::masks::inspection::{Inspection, MaskedRaster};

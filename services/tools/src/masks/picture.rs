@@ -2,9 +2,9 @@
 
 use std::{fs, path::Path};
 
-use gyre_mapping::encode_png;
+use gyre_configuration::terminal::Failure;
+use gyre_slam::mapping::encode_png;
 use gyre_storage::StorageError;
-use gyre_terminal::Failure;
 use png::ColorType;
 
 pub fn write_grey(path: &Path, width: usize, pixels: &[u8]) -> Result<(), Failure> {

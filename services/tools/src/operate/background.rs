@@ -11,13 +11,13 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 
+use gyre_configuration::terminal::{Failure, own, print};
 use gyre_results::SUMMARY;
 use gyre_stage::{
     control::{Control, Phase, Status},
     wake::Signals,
 };
 use gyre_supervise::last_line;
-use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::operate::choice::{RunChoice, chosen_to_change};

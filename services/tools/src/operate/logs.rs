@@ -4,9 +4,9 @@ use std::{path::Path, process::ExitCode, time::Duration};
 
 use clap::Args;
 use gyre_configuration::process_names;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_recording::LogTail;
 use gyre_stage::{control::Control, wake::Signals};
-use gyre_terminal::{Failure, print};
 use serde_json::Value;
 
 use crate::operate::choice::RunChoice;

@@ -3,13 +3,13 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_stage::{
     StageError,
     control::{Activity, Control, Phase, ProcessStatus, Status},
     source::Received,
 };
 use gyre_supervise::UsedRun;
-use gyre_terminal::{Failure, print};
 
 use crate::operate::choice::RunChoice;
 

@@ -3,10 +3,10 @@
 use std::{env, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_run::StageConfig;
+use gyre_configuration::terminal::{Failure, print, words};
+use gyre_contract::run::StageConfig;
 use gyre_stage::control::{PendingSwap, Swap};
 use gyre_supervise::Program;
-use gyre_terminal::{Failure, print, words};
 
 use crate::operate::choice::{RunChoice, chosen_to_change};
 

@@ -10,11 +10,11 @@ use std::{
 };
 
 use clap::Args;
+use gyre_configuration::terminal::{Failure, WIDTH, print};
 use gyre_stage::{
     observer::{ObservedRun, Observer},
     wake::Signals,
 };
-use gyre_terminal::{Failure, WIDTH, print};
 use ratatui::{
     DefaultTerminal,
     crossterm::event::{self, Event, KeyCode, KeyModifiers},
@@ -125,5 +125,5 @@ fn wait(
     Ok(false)
 }
 
-type Poses<'run> = Observer<'run, gyre_messages::Pose>;
-type Scans<'run> = Observer<'run, gyre_messages::Scan>;
+type Poses<'run> = Observer<'run, gyre_contract::Pose>;
+type Scans<'run> = Observer<'run, gyre_contract::Scan>;

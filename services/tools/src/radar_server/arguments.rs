@@ -6,8 +6,8 @@ use std::{
 };
 
 use clap::Args;
-use gyre_run::Rate;
-use gyre_terminal::{inputs::Inputs, seconds};
+use gyre_configuration::terminal::{inputs::Inputs, seconds};
+use gyre_contract::run::Rate;
 
 use crate::radar_server::server::Faults;
 

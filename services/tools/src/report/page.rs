@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use gyre_configuration::difference::keys;
-use gyre_evaluation::plot::paths_svg;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::StageId;
 use gyre_geometry::Pose;
-use gyre_messages::StageId;
+use gyre_results::evaluation::plot::paths_svg;
 use gyre_results::figures::{Figure, GROUPS};
-use gyre_terminal::Failure;
 use toml::Table;
 
 use crate::report::{

@@ -5,12 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::read_trajectory;
-use gyre_evaluation::Evaluation;
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
+use gyre_results::evaluation::Evaluation;
 use gyre_results::{SUMMARY, judgement::judge, require_results};
-use gyre_terminal::{Failure, print};
 use serde_json::{Value, json};
 
 pub struct Subject {

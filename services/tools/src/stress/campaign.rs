@@ -2,10 +2,10 @@
 
 use std::{sync::Arc, thread, time::Duration};
 
-use gyre_messages::StageId;
-use gyre_run::{Limits, RADAR_HZ, Scenario};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::StageId;
+use gyre_contract::run::{Limits, RADAR_HZ, Scenario};
 use gyre_stage::run::{free_shared_memory, sweep};
-use gyre_terminal::Failure;
 
 use crate::stress::{
     Report, TestedPipeline,

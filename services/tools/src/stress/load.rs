@@ -8,13 +8,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::topics;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::topics;
 use gyre_stage::{
     observer::{ObservedRun, wait_for_any},
     wake::{MAX_WAIT, Signals},
 };
 use gyre_supervise::memory;
-use gyre_terminal::{Failure, print};
 
 /// The line that a helper prints when it works.
 pub(super) const READY: &str = "ready";

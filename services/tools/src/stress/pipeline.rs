@@ -9,13 +9,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Footprint, Pose, PoseHeader, StageId};
-use gyre_run::{PlayedFault, Scenario};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::{PlayedFault, Scenario};
+use gyre_contract::{Footprint, Pose, PoseHeader, StageId};
 use gyre_stage::{
     StageError, clock,
     observer::{Next, Observer},
 };
-use gyre_terminal::Failure;
 
 use crate::stress::{
     TestedPipeline,

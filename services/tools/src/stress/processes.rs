@@ -9,7 +9,7 @@ use std::{
     time::Instant,
 };
 
-use gyre_messages::{FollowerId, StageId};
+use gyre_contract::{FollowerId, StageId};
 use gyre_stage::control::Control;
 use gyre_supervise::{ProcessStat, Usage};
 use serde::Serialize;

@@ -8,8 +8,8 @@ mod distribution;
 
 use std::ops::Range;
 
-use gyre_messages::{Item, PoseHeader, StageId, WitnessCounts, flag};
-use gyre_run::latency::Durations;
+use gyre_contract::run::latency::Durations;
+use gyre_contract::{Item, PoseHeader, StageId, WitnessCounts, flag};
 use serde::Serialize;
 
 pub use distribution::Distribution;

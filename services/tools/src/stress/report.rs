@@ -5,8 +5,8 @@ mod outcome;
 
 use std::{fs, path::Path};
 
+use gyre_configuration::terminal::Failure;
 use gyre_stage::StageError;
-use gyre_terminal::Failure;
 use serde::Serialize;
 
 pub use figures::Figures;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 use serde::Serialize;
 
 use crate::stress::report::{Check, Figures};

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use gyre_scan_matching::{RotationConfig, SequentialRotation};
+use gyre_matching::{RotationConfig, SequentialRotation};
 use gyre_stage::StageError;
 use gyre_stages::search::rotation;
 

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use gyre_scan_matching::{TranslationConfig, TranslationSearch};
+use gyre_matching::{TranslationConfig, TranslationSearch};
 use gyre_stage::StageError;
 use gyre_stages::search::translation;
 

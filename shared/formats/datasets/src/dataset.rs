@@ -30,8 +30,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_geometry::samples::{BagFixes, Sample, SampleKind};
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::{BagFixes, Sample, SampleKind};
 
 pub use dataset_toml::stored_options;
 pub use detect::is_dataset;

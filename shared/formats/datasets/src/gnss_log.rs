@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub use faults::GnssFaults;
 pub use received::ReceivedFixes;
 
-use gyre_samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
+use gyre_geometry::samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
 use crate::{LogError, gps_imu_twist, logs, table::Raw};
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 pub use faults::{LogFaults, LogGap};
 
-use gyre_samples::{Sample, SampleKind, UpAxis};
+use gyre_geometry::samples::{Sample, SampleKind, UpAxis};
 
 use crate::{Format, LogError, gps_imu_twist, logs, table::Raw};
 use columns::GyroColumns;

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, path::Path};
 
-use gyre_samples::{
+use gyre_geometry::samples::{
     GyroConfig, GyroKind, Sample, SampleKind, WheelsConfig, WheelsKind, interval_of,
 };
 
@@ -215,7 +215,7 @@ fn between(samples: &[Sample], after_ns: i64, until_ns: i64) -> &[Sample] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_samples::UpAxis;
+    use gyre_geometry::samples::UpAxis;
     use proptest::prelude::*;
 
     use super::*;

@@ -7,7 +7,7 @@ mod counts;
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
-use gyre_samples::{Sample, SampleKind};
+use gyre_geometry::samples::{Sample, SampleKind};
 
 use counts::CountColumns;
 

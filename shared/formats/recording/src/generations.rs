@@ -6,7 +6,7 @@ use std::{
     ops::Bound::{Excluded, Unbounded},
 };
 
-use gyre_messages::GivenAnew;
+use gyre_contract::GivenAnew;
 use mcap::records::Metadata;
 
 use crate::Entry;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_datasets::{GnssLog, LogError};
-use gyre_samples::{GnssConfig, GnssKind};
+use gyre_geometry::samples::{GnssConfig, GnssKind};
 
 use crate::{
     bags::{self, is_bag},

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gyre_messages::topic;
+use gyre_contract::topic;
 use gyre_storage::quoted;
 use mcap::records::Metadata;
 

@@ -1,7 +1,7 @@
 //! The image in a payload: its rows, which a viewer draws, and the rest.
 
 use bytemuck::pod_read_unaligned;
-use gyre_messages::{Masked, MaskedHeader, Message, Scan, ScanHeader};
+use gyre_contract::{Masked, MaskedHeader, Message, Scan, ScanHeader};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rows {

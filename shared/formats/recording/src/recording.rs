@@ -6,7 +6,7 @@ use std::{
 };
 
 use foxglove::{Decode, messages::RawImage};
-use gyre_messages::{GivenAnew, Item, NumberedBy, topic};
+use gyre_contract::{GivenAnew, Item, NumberedBy, topic};
 use mcap::records::op;
 
 use crate::{

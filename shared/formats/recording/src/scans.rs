@@ -6,13 +6,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_contract::{Message, Scan, ScanHeader};
 use gyre_datasets::{
     DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError, Properties, ReadError,
     turn_ns,
 };
-use gyre_messages::{Message, Scan, ScanHeader};
+use gyre_geometry::samples::Sample;
 use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::Sample;
 
 use crate::{Entry, Recording, Stored, image::read};
 

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use bytemuck::pod_read_unaligned;
-use gyre_messages::Item;
+use gyre_contract::Item;
 
 use crate::{
     Entry, Head, Incoming, Ledger, Positions, RecordingError, RecordingWriter, next_part,

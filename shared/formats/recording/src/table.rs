@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Write};
 
-use gyre_messages::{GivenAnew, Item};
+use gyre_contract::{GivenAnew, Item};
 use mcap::records::Metadata;
 
 const NAME: &str = "gyre.table";

@@ -15,12 +15,12 @@ use foxglove::{
         TextPrimitive, Timestamp, Vector3, log::Level, packed_element_field::NumericType,
     },
 };
-use gyre_geometry::SparsePoint;
-use gyre_messages::{
+use gyre_contract::{
     Correction, CorrectionHeader, Fix, FixHeader, Item, ListedObject, Loop, LoopHeader, Masked,
     MaskedHeader, Message, Motion, MotionHeader, Objects, ObjectsHeader, PoseHeader, Refined,
     Rotation, RotationHeader, Scan,
 };
+use gyre_geometry::SparsePoint;
 
 use crate::image::{Rows, read};
 
@@ -74,9 +74,9 @@ pub const CHANNELS: [Channel; 14] = [
     channel::<PoseInFrame>(Some(Rotation::TOPIC), "/rotation"),
     channel::<PoseInFrame>(Some(Motion::TOPIC), "/motion"),
     channel::<PoseInFrame>(Some(Refined::TOPIC), "/refined"),
-    channel::<PoseInFrame>(Some(gyre_messages::Pose::TOPIC), "/pose"),
-    channel::<FrameTransform>(Some(gyre_messages::Pose::TOPIC), "/tf"),
-    channel::<PosesInFrame>(Some(gyre_messages::Pose::TOPIC), TRAJECTORY),
+    channel::<PoseInFrame>(Some(gyre_contract::Pose::TOPIC), "/pose"),
+    channel::<FrameTransform>(Some(gyre_contract::Pose::TOPIC), "/tf"),
+    channel::<PosesInFrame>(Some(gyre_contract::Pose::TOPIC), TRAJECTORY),
     channel::<PoseInFrame>(Some(Loop::TOPIC), "/loop"),
     channel::<FrameTransform>(Some(Correction::TOPIC), "/correction"),
     channel::<PoseInFrame>(Some(Fix::TOPIC), "/fix"),
@@ -192,7 +192,7 @@ fn views_of(topic: &str, header: &[u8]) -> Option<Vec<View>> {
         }
         Motion::TOPIC => vec![motion("/motion", &read(header)?)],
         Refined::TOPIC => vec![motion("/refined", &read(header)?)],
-        gyre_messages::Pose::TOPIC => {
+        gyre_contract::Pose::TOPIC => {
             let it: PoseHeader = read(header)?;
             let place = [it.x_m, it.y_m, it.yaw_rad];
             vec![
@@ -231,7 +231,7 @@ pub(crate) struct Recent {
 impl Recent {
     /// Adds a message if it is a pose, and returns the trajectory if it is due.
     pub fn add(&mut self, topic: &str, header: &[u8]) -> Option<View> {
-        let header: PoseHeader = (topic == gyre_messages::Pose::TOPIC).then(|| read(header))??;
+        let header: PoseHeader = (topic == gyre_contract::Pose::TOPIC).then(|| read(header))??;
         if self.places.len() == RECENT {
             self.places.pop_front();
         }

@@ -16,7 +16,7 @@ use std::{
 
 use bytemuck::pod_read_unaligned;
 use foxglove::{Encode, Schema, messages::RawImage};
-use gyre_messages::{GivenAnew, Item, topic};
+use gyre_contract::{GivenAnew, Item, topic};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
 use crate::{

@@ -9,8 +9,8 @@ use std::{
 };
 
 use bytemuck::{Zeroable, bytes_of};
+use gyre_contract::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_datasets::DatasetOptions;
-use gyre_messages::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_radar::OwnedScan;
 use gyre_recording::{
     Head, Incoming, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,

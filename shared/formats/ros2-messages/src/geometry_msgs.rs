@@ -1,7 +1,7 @@
 //! `geometry_msgs`: poses, twists and transforms. Frames follow REP-103, lengths are in m, angles
 //! in rad.
 
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 use serde::{Deserialize, Serialize};
 
 use crate::{

@@ -1,6 +1,6 @@
 //! `nav_msgs`: odometry and grids.
 
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 
 use crate::{
     builtin_interfaces::Time,

@@ -3,8 +3,8 @@
 //! Both are in the frame `odom`: the vehicle's frame at the first scan. Gyre's objects are in the
 //! radar's frame, so they are moved and turned by the [`Mounting`].
 
+use gyre_contract::ListedObject;
 use gyre_geometry::{Pose, pose as planar};
-use gyre_messages::ListedObject;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::{

@@ -1,6 +1,6 @@
 //! `sensor_msgs`: images, and the measurements of inertial sensors and GNSS receivers.
 
-use gyre_samples::{RawFix, Sample, SampleKind};
+use gyre_geometry::samples::{RawFix, Sample, SampleKind};
 
 use crate::{
     definition::package,

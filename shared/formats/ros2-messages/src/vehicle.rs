@@ -1,7 +1,7 @@
 //! The vehicle that carries the radar: the messages of a run's poses.
 
+use gyre_contract::{PoseHeader, flag, outcome};
 use gyre_geometry::Pose;
-use gyre_messages::{PoseHeader, flag, outcome};
 
 use crate::{
     Mounting,

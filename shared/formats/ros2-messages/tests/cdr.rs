@@ -1,5 +1,6 @@
 //! Messages as bytes.
 
+use gyre_geometry::samples::RawFix;
 use gyre_ros2_messages::{
     Ros2Message, decode, encode,
     geometry_msgs::Quaternion,
@@ -10,7 +11,6 @@ use gyre_ros2_messages::{
     vision_msgs::Detection3DArray,
     visualization_msgs::{CUBE, MarkerArray},
 };
-use gyre_samples::RawFix;
 
 #[test]
 fn big_endian_messages_are_read() {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
-use gyre_messages::{ListedObject, ObjectsHeader};
+use gyre_contract::{ListedObject, ObjectsHeader};
 use gyre_ros2_messages::{
     Vehicle,
     frames::UNKNOWN,

@@ -1,6 +1,6 @@
 //! The method on one page.
 
-use gyre_scan_matching::SettingError;
+use gyre_matching::SettingError;
 use nalgebra::DVector;
 
 use crate::{

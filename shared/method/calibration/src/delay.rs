@@ -1,7 +1,7 @@
 //! The delay of a gyro or of wheels against the radar, from the motions of a run.
 
+use gyre_geometry::samples::Sample;
 use gyre_radar::median;
-use gyre_samples::Sample;
 
 use crate::{
     Estimate,

@@ -2,12 +2,12 @@
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::MaskerError;
-use gyre_odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError};
+use gyre_matching::odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError};
+use gyre_matching::{Refiner, SettingError};
 use gyre_radar::{
     OwnedScan, PointExtractor, PolarScan, Sense,
     scan::{ScanError, flag},
 };
-use gyre_scan_matching::{Refiner, SettingError};
 
 use crate::{
     FactVector, OwnReflections,

@@ -1,6 +1,6 @@
 use std::convert::Infallible;
 
-use gyre_scan_matching::SettingError;
+use gyre_matching::SettingError;
 use gyre_slam::ClosingError;
 use thiserror::Error;
 

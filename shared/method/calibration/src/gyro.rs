@@ -13,8 +13,8 @@ pub(crate) mod turns;
 pub use found::GyroCalibration;
 pub(crate) use found::log_keys;
 
+use gyre_geometry::samples::Sample;
 use gyre_geometry::wrap_angle;
-use gyre_samples::Sample;
 use thiserror::Error;
 
 use crate::{Drive, Track};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gyre_samples::{Sample, WheelsConfig};
+use gyre_geometry::samples::{Sample, WheelsConfig};
 
 use crate::{
     Drive, Estimate, Track,

@@ -4,7 +4,7 @@
 
 use gyre_calibration::{Calibration, Drive, Fact, calibrate};
 use gyre_datasets::DatasetOptions;
-use gyre_odometry::OdometryConfig;
+use gyre_matching::odometry::OdometryConfig;
 use gyre_radar::OwnedScan;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 

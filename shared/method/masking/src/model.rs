@@ -78,7 +78,7 @@ impl Card {
                 "it is the model itself; its card is the .toml beside it"
             )));
         }
-        let text = match gyre_shipped::text(path) {
+        let text = match gyre_storage::shipped::text(path) {
             Some(text) => text.to_owned(),
             None => gyre_storage::read_text(path, gyre_storage::SETTINGS)
                 .map_err(|error| format!("cannot read the model's card {shown}: {error}"))?,
@@ -170,7 +170,7 @@ impl Model {
         check_raster(path, &card.raster, raster)?;
         let file = path.with_file_name(&card.model.file);
         let shown = file.display();
-        let bytes = match gyre_shipped::bytes(&file) {
+        let bytes = match gyre_storage::shipped::bytes(&file) {
             Some(bytes) => bytes.to_owned(),
             None => gyre_storage::read_bytes(&file, MAX_BYTES)
                 .map_err(|error| format!("cannot read the model's file {shown}: {error}"))?,

@@ -14,7 +14,7 @@ mod tests;
 
 use std::f32::consts::TAU;
 
-use gyre_samples::DopplerVelocity;
+use gyre_geometry::samples::DopplerVelocity;
 use thiserror::Error;
 
 use crate::scan::{PolarScan, ScanError, flag};

@@ -14,7 +14,7 @@ pub mod trajectory;
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use doppler::{DopplerEstimator, NoDoppler, check_chirps};
-pub use gyre_samples::SettingError;
+pub use gyre_geometry::SettingError;
 pub use lost::{LostAzimuthFinder, LostAzimuths, PlacedRows};
 pub use median::median;
 pub use points::{PointExtractor, PointsConfig};

@@ -14,7 +14,7 @@ mod tests;
 
 use crate::scan::{PolarScan, ScanError, Sense};
 use gyre_geometry::SparsePoint;
-use gyre_samples::{SettingError, check, check_bounds};
+use gyre_geometry::{SettingError, check, check_bounds};
 use peaks::{Beam, Peak};
 use range_cells::RangeCells;
 use schemars::JsonSchema;

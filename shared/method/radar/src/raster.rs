@@ -18,7 +18,7 @@ use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
 use bearing_table::BearingTable;
 use cells::Cells;
 use gyre_geometry::Twist;
-use gyre_samples::{SettingError, check, check_bounds};
+use gyre_geometry::{SettingError, check, check_bounds};
 use kernels::locate::{self, Lookup, Taps};
 use ndarray::ArrayViewMut2;
 use polar_image::PolarImage;

@@ -3,13 +3,13 @@
 
 mod cache;
 
-use gyre_estimation::places::{
+use crate::estimation::places::{
     Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
     neighbours,
 };
-use gyre_estimation::{Constraint, EstimationError, GraphOptions, Outcome, PoseGraph};
+use crate::estimation::{Constraint, EstimationError, GraphOptions, Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion, covariance};
-use gyre_scan_matching::{RefinementConfig, SettingError, Submap};
+use gyre_matching::{RefinementConfig, SettingError, Submap};
 use thiserror::Error;
 
 use crate::place::Place;

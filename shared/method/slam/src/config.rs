@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use gyre_estimation::places::SUBMAP_REACH_M;
+use crate::estimation::places::SUBMAP_REACH_M;
 
 use crate::EstimatorKind;
 

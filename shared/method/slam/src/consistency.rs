@@ -4,7 +4,7 @@
 
 use std::cmp::Reverse;
 
-use gyre_estimation::{CHI_SQUARE_99_9, Constraint, chi_square};
+use crate::estimation::{CHI_SQUARE_99_9, Constraint, chi_square};
 use gyre_geometry::{Pose, UncertainMotion, covariance::lever};
 use nalgebra::Matrix3;
 

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use gyre_estimation::{EstimationError, PoseGraph, Position};
+use crate::estimation::{EstimationError, PoseGraph, Position};
+use gyre_geometry::samples::{GnssConfig, GnssFix};
 use gyre_geometry::{Pose, interpolate};
 use gyre_radar::{ClockOffset, clock_offset};
 use gyre_radar::{Trajectory, median};
-use gyre_samples::{GnssConfig, GnssFix};
 use nalgebra::{Point2, Vector2};
 
 /// The acceleration of vehicles that brake, m/s²: between two keyframes a place is known as well as

@@ -1,6 +1,6 @@
 use std::mem;
 
-use gyre_estimation::places::KeyframeSelector;
+use crate::estimation::places::KeyframeSelector;
 use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
 
 use crate::Keyframe;

@@ -1,6 +1,6 @@
+use crate::estimation::Constraint;
+pub use crate::estimation::places::VerificationOutcome as LoopOutcome;
 use bytemuck::{Pod, Zeroable};
-use gyre_estimation::Constraint;
-pub use gyre_estimation::places::VerificationOutcome as LoopOutcome;
 use gyre_geometry::UncertainMotion;
 use gyre_storage::LogMagic;
 

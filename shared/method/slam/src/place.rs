@@ -1,5 +1,5 @@
+use crate::estimation::places::Descriptor;
 use bytemuck::{Pod, Zeroable};
-use gyre_estimation::places::Descriptor;
 use gyre_geometry::UncertainMotion;
 use gyre_storage::LogMagic;
 

@@ -1,4 +1,4 @@
-use gyre_estimation::{
+use crate::estimation::{
     Constraint, EstimationError, GraphOptions, Kind, Outcome, PoseGraph, TrajectoryFilter, Verdict,
     WeightedPosition,
 };

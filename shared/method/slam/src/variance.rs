@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use gyre_estimation::{EstimationError, Kind, PoseGraph};
+use crate::estimation::{EstimationError, Kind, PoseGraph};
 
 use crate::JudgedLoop;
 use crate::consistency::DeadReckoning;

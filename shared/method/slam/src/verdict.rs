@@ -1,6 +1,6 @@
 use std::fmt;
 
-use gyre_estimation::{CHI_SQUARE_99_9, Constraint};
+use crate::estimation::{CHI_SQUARE_99_9, Constraint};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoopVerdict {

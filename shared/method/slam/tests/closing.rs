@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use crate::common::{AROUND, Drive};
-use gyre_scan_matching::RefinementConfig;
+use gyre_matching::RefinementConfig;
 use gyre_slam::{LoopCloser, LoopOutcome, Place, Query, Record, SUBMAP_REACH_M};
 
 const KEYFRAMES: usize = 2 * AROUND + 20;

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 mod common;
+mod estimation;
+mod maps;
 
 mod closing;
 mod fixes;

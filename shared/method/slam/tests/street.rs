@@ -5,7 +5,7 @@
 use std::f64::consts::PI;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
-use gyre_scan_matching::RefinementConfig;
+use gyre_matching::RefinementConfig;
 use gyre_slam::localisation::{Localisation, Localiser, Map, Observation, Status};
 use gyre_slam::{Keyframe, RecordLog};
 use nalgebra::{Matrix3, Point2};

@@ -1,8 +1,8 @@
 //! The trajectory from odometry and loops, right and wrong ones.
 
 use crate::common::{AROUND, Drive};
-use gyre_estimation::Constraint;
 use gyre_geometry::{Pose, UncertainMotion, pose};
+use gyre_slam::estimation::Constraint;
 use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator};
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, path::Path};
 
-use gyre_messages::{PoseHeader, flag};
+use gyre_contract::{PoseHeader, flag};
 use gyre_storage::{Busy, File, GroupSync};
 
 use crate::{JournalError, Records, record::RECORDS};

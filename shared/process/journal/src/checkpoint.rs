@@ -15,8 +15,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_messages::{MotionEstimate, PoseHeader};
-use gyre_scan_matching::{Refiner, TrackerState};
+use gyre_contract::{MotionEstimate, PoseHeader};
+use gyre_matching::{Refiner, TrackerState};
 use gyre_storage::{DurableFile, GroupSync, Slots, StorageError};
 
 use crate::JournalError;

@@ -2,8 +2,8 @@
 
 use std::{mem, path::Path};
 
+use gyre_contract::PoseHeader;
 use gyre_geometry::SparsePoint;
-use gyre_messages::PoseHeader;
 use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose, records_path};
 use gyre_storage::LogError;
 

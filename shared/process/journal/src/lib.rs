@@ -20,8 +20,8 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+use gyre_contract::{PoseHeader, flag};
 use gyre_geometry::SparsePoint;
-use gyre_messages::{PoseHeader, flag};
 use gyre_storage::DurableFile;
 
 pub use check::{Content, check, cut};

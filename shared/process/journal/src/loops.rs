@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
+use gyre_contract::{Item, LoopHeader};
 use gyre_geometry::{covariance, xy_yaw};
-use gyre_messages::{Item, LoopHeader};
 use gyre_slam::{Keyframe, LoopCandidate, Query, RecordReader};
 use gyre_storage::LogError;
 

@@ -1,8 +1,8 @@
 //! The objects of each scan of a run, as the follower that tracks them has found them.
 
 use bytemuck::{Pod, Zeroable};
+use gyre_contract::ListedObject;
 use gyre_geometry::wrap_angle;
-use gyre_messages::ListedObject;
 use gyre_objects::Object;
 use gyre_slam::Record;
 use gyre_storage::LogMagic;

@@ -1,7 +1,7 @@
 //! The binary layout of a journal and of its records, and of records of other logs.
 
 use bytemuck::{AnyBitPattern, pod_read_unaligned};
-use gyre_messages::PoseHeader;
+use gyre_contract::PoseHeader;
 use gyre_storage::{Checksum, Slots};
 
 /// The start of a journal, with the version of its records.

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_messages::PoseHeader;
+use gyre_contract::PoseHeader;
 use gyre_storage::{StorageError, may_begin};
 
 use crate::{

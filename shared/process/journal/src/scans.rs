@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use bytemuck::{Pod, Zeroable};
+use gyre_contract::PoseHeader;
 use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
-use gyre_messages::PoseHeader;
 use gyre_slam::{Record, RecordLog, RecordReader, records_path};
 use gyre_storage::{LogError, LogMagic};
 
@@ -153,7 +153,7 @@ pub fn complete_scans(out: &Path, poses: u64) -> Result<u64, LogError> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_messages::{Item, MotionEstimate};
+    use gyre_contract::{Item, MotionEstimate};
 
     use super::*;
 

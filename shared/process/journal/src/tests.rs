@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 use std::{fs, thread, time::Duration};
 
-use gyre_messages::Item;
+use gyre_contract::Item;
 use gyre_storage::GroupSync;
 
 use super::*;

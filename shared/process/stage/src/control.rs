@@ -90,7 +90,7 @@ pub struct PendingSwap {
     pub limit_s: Option<f64>,
 }
 
-gyre_messages::named! {
+gyre_contract::named! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Phase {
@@ -122,7 +122,7 @@ pub struct ProcessStatus {
     pub received: Option<Received>,
 }
 
-gyre_messages::named! {
+gyre_contract::named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Activity {

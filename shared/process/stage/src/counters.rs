@@ -8,7 +8,7 @@ use std::{
     path::PathBuf,
 };
 
-use gyre_run::StageCounters;
+use gyre_contract::run::StageCounters;
 
 use crate::{Manifest, StageError, clock, run};
 

@@ -4,7 +4,7 @@
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Header, Item, Message};
+use gyre_contract::{Header, Item, Message};
 
 pub use crate::transport::Notifier;
 use crate::{
@@ -18,7 +18,7 @@ use crate::{
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
 
-gyre_messages::named! {
+gyre_contract::named! {
     /// A log of a run that followers read; its name is the event of its growth.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum LogId {

@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_messages::{GivenAnew, Item, NumberedBy};
+use gyre_contract::{GivenAnew, Item, NumberedBy};
 
 use crate::{Manifest, StageError};
 

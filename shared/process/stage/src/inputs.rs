@@ -1,7 +1,7 @@
 //! The inputs of a stage: pairs of consecutive items of one topic, alone or joined with another
 //! topic.
 
-use gyre_messages::{Item, Masked, Message, Pair, flag};
+use gyre_contract::{Item, Masked, Message, Pair, flag};
 
 use crate::{
     Launch, StageError,

@@ -5,8 +5,8 @@ use std::{
     process::ExitCode, sync::Mutex, time::Duration,
 };
 
-use gyre_messages::FollowerId;
-use gyre_run::{RunConfig, StageConfig};
+use gyre_contract::FollowerId;
+use gyre_contract::run::{RunConfig, StageConfig};
 use rustix::{
     io::{Errno, ioctl_fionbio},
     mm::{MlockAllFlags, mlockall},

@@ -50,7 +50,7 @@ pub use error::StageError;
 pub use follower::Follower;
 pub use generation::Generation;
 pub use gnss_receiver::GnssReceiver;
-pub use gyre_run::StageCounters;
+pub use gyre_contract::run::StageCounters;
 pub use launch::Launch;
 pub use manifest::Manifest;
 pub use sink::Sink;

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_messages::{Limits, Message, Refined, Window, topics};
+use gyre_contract::{Limits, Message, Refined, Window, topics};
 use serde::{Deserialize, Serialize};
 
 use crate::StageError;

@@ -1,6 +1,6 @@
 //! Messages of any type.
 
-use gyre_messages::Item;
+use gyre_contract::Item;
 
 /// Stands for the message type of a topic that is known by its name alone.
 pub enum AnyMessage {}

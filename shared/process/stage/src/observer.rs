@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
+use gyre_contract::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
 
 use crate::{
     Listener, Manifest, StageError, generation,
@@ -67,7 +67,7 @@ pub type TopicObserver<'run> = Observer<'run, AnyMessage>;
 pub enum Next<'a, M> {
     /// A message, and the number of items that were missed directly before it. If masking was
     /// started again in live mode, it may have a number that was received before: see
-    /// [`Item::generation`](gyre_messages::Item).
+    /// [`Item::generation`](gyre_contract::Item).
     Message(&'a Received<M>, u64),
     Idle,
     Ended,
@@ -131,7 +131,7 @@ impl ObservedRun {
 
     /// Subscribes to the topic of this name; `None` for an unknown topic.
     pub fn observe_topic(&self, topic: &str) -> Result<Option<TopicObserver<'_>>, StageError> {
-        let topic = gyre_messages::topic(topic);
+        let topic = gyre_contract::topic(topic);
         topic.map(|topic| self.attach(topic)).transpose()
     }
 

@@ -3,7 +3,7 @@
 use std::{marker::PhantomData, slice};
 
 use bytemuck::Pod;
-use gyre_messages::{Item, Limits, Message, Topic, flag};
+use gyre_contract::{Item, Limits, Message, Topic, flag};
 use iceoryx2::{
     port::{ReceiveError, port_name::PortName, subscriber},
     sample::Sample,

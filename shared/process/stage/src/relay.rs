@@ -3,7 +3,7 @@
 
 use std::os::fd::BorrowedFd;
 
-use gyre_messages::{Item, Message, Motion, MotionHeader, Pose, PoseHeader, Scan, StageId};
+use gyre_contract::{Item, Message, Motion, MotionHeader, Pose, PoseHeader, Scan, StageId};
 
 use crate::{
     Launch, StageCounters, StageError, clock, counters,
@@ -214,7 +214,7 @@ impl<'a> LastStages<'a> {
 }
 
 fn inlet(launch: &Launch, name: &str) -> Result<Reader<AnyMessage>, StageError> {
-    let topic = gyre_messages::topic(name)
+    let topic = gyre_contract::topic(name)
         .ok_or_else(|| StageError::Input(format!("no stage publishes the topic `{name}`")))?;
     // Whichever item comes first: after a restart that is one of the history.
     let port = Port::to(topic, &launch.node, &launch.manifest)?;

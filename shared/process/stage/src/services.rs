@@ -1,7 +1,7 @@
 //! The services of the transport: the supervisor creates them once with the sizes of the window,
 //! and stages only open them. So no restart finds a service missing or of another size.
 
-use gyre_messages::{FollowerId, Message, Pose, Sender, StageId, Topic, Window};
+use gyre_contract::{FollowerId, Message, Pose, Sender, StageId, Topic, Window};
 
 use crate::{
     StageError,
@@ -22,7 +22,7 @@ impl Services {
             events.push(Event::create(node, name, ports, nodes)?);
             Ok(())
         };
-        for topic in gyre_messages::topics(window) {
+        for topic in gyre_contract::topics(window) {
             let (name, sizes) = (topic.name, (topic.sizes)(window));
             let (subscribers, nodes) = (sizes.subscribers(), sizes.nodes());
             event(&data_event(name), [subscribers, 1], nodes)?;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use gyre_messages::{
+use gyre_contract::{
     Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, StageId, flag,
 };
 

@@ -18,8 +18,8 @@ use std::{
 
 use rustix::thread::set_current_timer_slack;
 
-use gyre_messages::{ScanHeader, StageId};
-use gyre_run::SourceConfig;
+use gyre_contract::run::SourceConfig;
+use gyre_contract::{ScanHeader, StageId};
 
 use crate::{Launch, StageCounters, StageError};
 pub use feed::Credit;

@@ -2,7 +2,7 @@
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Header, Hop, Item, Message};
+use gyre_contract::{Header, Hop, Item, Message};
 
 use crate::{
     Launch, StageCounters, StageError,
@@ -18,7 +18,7 @@ pub trait Stage {
     type Inputs: Inputs;
     type Output: Message;
     /// The stage that it is, or replaces.
-    const HOP: gyre_messages::StageId;
+    const HOP: gyre_contract::StageId;
 
     /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned
     /// sample. The item of the header is filled in afterwards.

@@ -12,7 +12,7 @@ mod zero_copy;
 
 use std::rc::Rc;
 
-use gyre_messages::{Item, Limits, Message, Pose, StageId, Window};
+use gyre_contract::{Item, Limits, Message, Pose, StageId, Window};
 use tempfile::TempDir;
 
 use crate::{

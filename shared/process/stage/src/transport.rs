@@ -1,6 +1,6 @@
 //! The transport, iceoryx2, behind a boundary without its types. Its ports are generic in the
 //! message; here each is instantiated once, for bytes, and a topic is opened with the names, sizes
-//! and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other languages.
+//! and alignments of [`gyre_contract::Topic`], as by the transport's bindings for other languages.
 
 mod event;
 mod service;

@@ -2,7 +2,7 @@
 
 use std::{fs::File, marker::PhantomData, path::Path, slice};
 
-use gyre_messages::{Item, Message, Pose, Sender, StageId, Topic, flag};
+use gyre_contract::{Item, Message, Pose, Sender, StageId, Topic, flag};
 use iceoryx2::{
     port::{publisher::Publisher, update_connections::UpdateConnections},
     prelude::BackpressureStrategy,
@@ -249,7 +249,7 @@ impl TopicWriter {
     /// Opens topics of the stream for publishing, in the place of the source.
     pub(crate) fn of_stream(launch: &Launch, topics: &[&str]) -> Result<Vec<Self>, StageError> {
         let of_stream = |topic: &&str| {
-            let found = gyre_messages::topic(topic)
+            let found = gyre_contract::topic(topic)
                 .filter(|it| matches!(it.sender, Sender::Stage(_)) && it.name != Pose::TOPIC);
             let topic = found.ok_or_else(|| {
                 let reason = format!("a source does not publish the topic `{topic}`");

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::StageId;
+use gyre_contract::StageId;
 use gyre_stage::{
     Manifest, StageError,
     control::{Activity, ProcessStatus},

@@ -168,7 +168,7 @@ fn unlink_incomplete_tags(directory: &Path) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_messages::Pose;
+    use gyre_contract::Pose;
     use gyre_stage::{observer::ObservedRun, wake::Signals};
 
     use super::*;

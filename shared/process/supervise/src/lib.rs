@@ -40,7 +40,7 @@ mod wake_limit;
 
 pub use child::Death;
 pub use guardian::guard;
-pub use gyre_run::{Ending, Scheduling, Swapped};
+pub use gyre_contract::run::{Ending, Scheduling, Swapped};
 pub use log::last_line;
 pub use plan::{END_TIMEOUT, Event, Plan, StagePlan, Stall, SuperviseError};
 pub use process_stat::ProcessStat;

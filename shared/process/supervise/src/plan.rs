@@ -5,8 +5,8 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::{FollowerId, PoseHeader, StageId};
-use gyre_run::{RestartPolicy, Scheduling};
+use gyre_contract::run::{RestartPolicy, Scheduling};
+use gyre_contract::{FollowerId, PoseHeader, StageId};
 use gyre_stage::{Manifest, StageError, follower::Progress};
 use thiserror::Error;
 

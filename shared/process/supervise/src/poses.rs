@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use gyre_messages::{Item, Pose, flag};
+use gyre_contract::{Item, Pose, flag};
 use gyre_stage::{
     Manifest, StageError,
     reader::{Port, Received},

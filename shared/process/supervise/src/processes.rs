@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::PoseHeader;
+use gyre_contract::PoseHeader;
 use gyre_stage::wake;
 
 use crate::{

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_messages::{PoseHeader, StageId};
+use gyre_contract::{PoseHeader, StageId};
 use gyre_stage::clock;
 
 use crate::Plan;

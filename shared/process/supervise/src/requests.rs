@@ -2,7 +2,7 @@
 
 use std::{env, path::Path, process};
 
-use gyre_messages::StageId;
+use gyre_contract::StageId;
 use gyre_stage::{
     StageError, clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},

@@ -9,7 +9,7 @@ mod recorded;
 
 use std::{collections::BTreeSet, fs, time::Duration};
 
-use gyre_messages::{StageId, Topic};
+use gyre_contract::{StageId, Topic};
 use gyre_stage::{
     Manifest, StageError,
     message::AnyMessage,
@@ -158,7 +158,7 @@ impl<'a> Rig<'a> {
 }
 
 fn known(topic: &str) -> Result<&'static Topic, StageError> {
-    let found = gyre_messages::topic(topic);
+    let found = gyre_contract::topic(topic);
     found.ok_or_else(|| StageError::Input(format!("no stage has a topic `{topic}`")))
 }
 

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use gyre_run::Scheduling;
+use gyre_contract::run::Scheduling;
 use rustix::{
     process::setpriority_process,
     thread::{CpuSet, sched_setaffinity},

@@ -5,7 +5,7 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_messages::Item;
+use gyre_contract::Item;
 use gyre_stage::{
     schedule::{self, Schedule},
     wake,

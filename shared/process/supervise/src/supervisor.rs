@@ -6,13 +6,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::flag;
+use gyre_contract::flag;
 use gyre_stage::{
     StageCounters, counters, sink, transport,
     wake::{self, Signals},
 };
 
-use gyre_run::Report;
+use gyre_contract::run::Report;
 
 use crate::{
     Ending, Event, Plan, SuperviseError,

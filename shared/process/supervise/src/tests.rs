@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::{FollowerId, Limits, StageId, Window};
+use gyre_contract::{FollowerId, Limits, StageId, Window};
 use gyre_stage::Manifest;
 
 use crate::{Plan, StagePlan};

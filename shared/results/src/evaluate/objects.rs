@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::evaluation::{ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors};
+use gyre_configuration::terminal::Failure;
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_evaluation::{ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, pose};
 use gyre_radar::Trajectory;
-use gyre_terminal::Failure;
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;

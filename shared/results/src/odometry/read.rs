@@ -2,9 +2,9 @@
 
 use std::{io::Read, path::Path};
 
-use gyre_evaluation::TimedMotion;
+use crate::evaluation::TimedMotion;
+use gyre_configuration::terminal::Failure;
 use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
-use gyre_terminal::Failure;
 use serde::Deserialize;
 
 use crate::table;
@@ -77,7 +77,7 @@ impl MotionRow {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_messages::{
+    use gyre_contract::{
         Item, MotionEstimate, PoseHeader, RefinementRecord, initial_guess, outcome,
     };
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use gyre_configuration::terminal::Failure;
 use gyre_storage::{self as storage, Draft};
-use gyre_terminal::Failure;
 
 use crate::out::{FILES, Out, SIMULATED_TRUTH};
 

@@ -1,10 +1,10 @@
 //! `map.png`: the keyframes at their corrected poses, with the trajectory and its loops.
 
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_geometry::Pose;
-use gyre_mapping::{Drawing, MapError, MapOptions, legible};
+use gyre_slam::mapping::{Drawing, MapError, MapOptions, legible};
 use gyre_slam::{Keyframe, RecordReader};
-use gyre_terminal::{Failure, print};
 
 use super::Slam;
 use crate::out::Out;

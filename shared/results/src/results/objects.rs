@@ -3,10 +3,10 @@
 use std::fmt::{self, Write};
 use std::path::Path;
 
+use gyre_configuration::terminal::Failure;
 use gyre_journal::objects::LoggedObjects;
 use gyre_objects::Object;
 use gyre_slam::RecordReader;
-use gyre_terminal::Failure;
 
 const HEADER: &str = "scan,stamp_ns,object,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,moving,age,\
     cov_xx,cov_xy,cov_yy,cov_vxvx,cov_vxvy,cov_vyvy\n";

@@ -1,13 +1,13 @@
 //! One pass over the journal.
 
+use crate::evaluation::TimedMotion;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::latency::LatencyMeter;
+use gyre_contract::{Item, PoseHeader, flag};
 use gyre_datasets::ground_truth::write_tum_pose;
-use gyre_evaluation::TimedMotion;
 use gyre_geometry::Pose;
-use gyre_messages::{Item, PoseHeader, flag};
 use gyre_radar::Trajectory;
-use gyre_run::latency::LatencyMeter;
 use gyre_storage::Draft;
-use gyre_terminal::Failure;
 
 use super::{Files, Slam, sketch::Sketch};
 use crate::{odometry, poses, summary::Counter};

@@ -1,6 +1,6 @@
 //! The path to be drawn, reduced to the number of poses that a picture needs.
 
-use gyre_evaluation::{EvaluationError, plot::path_svg};
+use crate::evaluation::{EvaluationError, plot::path_svg};
 use gyre_geometry::Pose;
 
 /// Up to twice as many poses are drawn.
@@ -56,7 +56,7 @@ impl Sketch {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_evaluation::path_m;
+    use crate::evaluation::path_m;
     use gyre_geometry::pose;
 
     use super::*;

@@ -1,6 +1,6 @@
 //! Counts of scans and motions.
 
-use gyre_messages::{
+use gyre_contract::{
     Basis, Item, MotionEstimate, PoseHeader, doppler, flag, gyro, initial_guess, outcome, wheels,
 };
 use serde::Serialize;
@@ -352,7 +352,7 @@ impl Gaps {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::RefinementRecord;
+    use gyre_contract::RefinementRecord;
     use gyre_radar::LostAzimuths;
 
     use super::*;

@@ -2,8 +2,8 @@
 
 use std::{env, path::Path};
 
-use gyre_run::{Ending, Rate};
-use gyre_terminal::{WIDTH, wrap};
+use gyre_configuration::terminal::{WIDTH, wrap};
+use gyre_contract::run::{Ending, Rate};
 
 use super::Summary;
 use crate::figures::all_unusual;
@@ -122,7 +122,7 @@ mod tests {
     use std::time::Duration;
 
     use gyre_configuration::Configuration;
-    use gyre_run::latency::Latency;
+    use gyre_contract::run::latency::Latency;
 
     use super::*;
     use crate::summary::{

@@ -1,9 +1,9 @@
 //! The part of the summary about GNSS.
 
 use gyre_datasets::GnssLog;
-use gyre_estimation::EstimationError;
 use gyre_geometry::{UncertainMotion, xy_yaw};
-use gyre_mapping::Origin;
+use gyre_slam::estimation::EstimationError;
+use gyre_slam::mapping::Origin;
 use gyre_slam::{FixRefusal, TrajectoryEstimator};
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use gyre_calibration::{Compared, delay};
 use gyre_configuration::Configuration;
-use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
+use gyre_contract::{PoseHeader, flag, initial_guess, outcome};
 
 use super::{Counts, GnssSummary};
 

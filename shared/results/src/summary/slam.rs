@@ -1,6 +1,6 @@
 //! The part of the summary about loops.
 
-use gyre_evaluation::LoopErrors;
+use crate::evaluation::LoopErrors;
 use serde::Serialize;
 
 #[derive(Debug, Default, Serialize)]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use gyre_samples::{Sample, SampleKind};
+use gyre_geometry::samples::{Sample, SampleKind};
 
 use super::SimulatedGyroConfig;
 use super::attitude::MeanMotion;

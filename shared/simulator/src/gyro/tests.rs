@@ -1,5 +1,5 @@
 #![allow(clippy::unwrap_used)]
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 use nalgebra::Vector3;
 
 use super::attitude::MeanMotion;

@@ -45,7 +45,7 @@ pub fn read(path: &Path, from_s: f64, rate_hz: f64) -> Result<SplinePath, Simula
 }
 
 fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    match gyre_shipped::text(path) {
+    match gyre_storage::shipped::text(path) {
         Some(text) => parse_trajectory(text, path),
         None => read_trajectory(path),
     }

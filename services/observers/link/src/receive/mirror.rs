@@ -1,7 +1,7 @@
 //! The copy of a run of another machine.
 
+use gyre_contract::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
 use gyre_journal::Journal;
-use gyre_messages::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
 use gyre_stage::{
     StageError,
     observer::Sequence,

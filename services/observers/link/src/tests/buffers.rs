@@ -2,8 +2,8 @@
 
 use std::{sync::Arc, time::Duration};
 
+use gyre_contract::{Item, MotionHeader, PoseHeader, flag};
 use gyre_journal::{self as journal, Journal};
-use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
 
 use super::{add, item};
 use crate::replay_buffer::{

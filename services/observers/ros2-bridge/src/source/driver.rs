@@ -1,6 +1,7 @@
 //! The topics of Navtech's driver.
 
 use gyre_colossus::Azimuth;
+use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{
     Definition, Ros2Message,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
@@ -9,7 +10,6 @@ use gyre_ros2_messages::{
     radar::DescribedRadar,
     sensor_msgs::Imu,
 };
-use gyre_samples::{Sample, SampleKind};
 use gyre_stage::{StageError, clock};
 use ros2_client::{Gid, ReadError, Subscription};
 

@@ -3,8 +3,8 @@
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 
+use gyre_geometry::samples::GnssConfig;
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
-use gyre_samples::GnssConfig;
 use gyre_stage::{StageError, clock};
 use ros2_client::Subscription;
 

@@ -6,9 +6,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{ScanHeader, StageId};
+use gyre_contract::{ScanHeader, StageId};
+use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{navtech_msgs::RadarBScanMsg, radar::DescribedRadar};
-use gyre_samples::{Sample, SampleKind};
 use gyre_stage::{
     StageError, clock,
     source::{Arrival, Received, Sensor},

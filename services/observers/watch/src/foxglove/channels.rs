@@ -1,7 +1,7 @@
 //! The channels that viewers can subscribe to.
 
 use base64::{Engine, prelude::BASE64_STANDARD};
-use gyre_messages::{Message, Pose};
+use gyre_contract::{Message, Pose};
 use gyre_recording::view::{CHANNELS, POINTS, TRAJECTORY};
 use gyre_stage::Manifest;
 use serde_json::{Value, json};

@@ -9,7 +9,7 @@ use std::{
 };
 
 use bytemuck::bytes_of;
-use gyre_messages::{
+use gyre_contract::{
     Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
 };
 use gyre_recording::{

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gyre_messages::{Item, StageId};
+use gyre_contract::{Item, StageId};
 use serde_json::{Value, json};
 
 pub const LATENCY: &str = "/latency";

@@ -1,8 +1,8 @@
 //! Masking: the motion of item `seq - lag` comes from `motion`, or after a restart from `pose`. The
 //! stage waits for it, and for no later one, or no scan would be admitted any more.
 
-use gyre_messages::{Masked, Message, Motion, Scan};
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{Masked, Message, Motion, Scan};
 
 use super::Examination;
 use crate::conformance::{

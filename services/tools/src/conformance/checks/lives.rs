@@ -6,9 +6,9 @@
 //! A program that stands by, as for a swap, reports when it is ready, opens nothing before its
 //! standard input ends, and then works as after a normal start.
 
-use gyre_messages::{Item, StageId, flag};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{Item, StageId, flag};
 use gyre_supervise::rig::Recorded;
-use gyre_terminal::Failure;
 
 use super::Examination;
 use crate::conformance::{

@@ -1,8 +1,8 @@
 //! Inputs that break the contract: the program ends with exit code 3 and a sentence, and sends
 //! nothing about them.
 
+use gyre_configuration::terminal::Failure;
 use gyre_stage::StageError;
-use gyre_terminal::Failure;
 
 use super::Examination;
 use crate::conformance::{

@@ -3,8 +3,8 @@
 
 use std::cell::Cell;
 
-use gyre_messages::{StageId, flag};
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{StageId, flag};
 
 use super::Examination;
 use crate::conformance::{
@@ -156,7 +156,7 @@ impl Session<'_> {
     /// Requires that a reader which comes now receives the newest items.
     fn gives_history(&mut self) -> Result<(), Failure> {
         let (topic, rig) = (self.output_topic(), &self.harness.rig);
-        let sizes = gyre_messages::topic(topic).map(|it| (it.sizes)(&rig.manifest().window));
+        let sizes = gyre_contract::topic(topic).map(|it| (it.sizes)(&rig.manifest().window));
         let wanted = sizes.map_or(0, |it| it.history).min(self.outputs.len());
         let (late, received) = (rig.tap(topic)?, Cell::new(0));
         self.wait(self.demands().item_timeout, |_| {

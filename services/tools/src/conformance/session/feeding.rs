@@ -1,7 +1,7 @@
 //! The messages that are fed to a process: its inputs as they are admitted, and the feedback of the
 //! rest of the run to its answers.
 
-use gyre_messages::{Message, Pose, flag};
+use gyre_contract::{Message, Pose, flag};
 use gyre_stage::{StageError, clock};
 
 use super::{Pace, Session};

@@ -7,8 +7,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_contract::StageId;
 use gyre_journal::checkpoint;
-use gyre_messages::StageId;
 use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::SuperviseError;
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use gyre_messages::{StageId, flag};
+use gyre_contract::{StageId, flag};
 use gyre_stage::{
     Listener, StageError,
     observer::{ObservedRun, TopicObserver},

@@ -2,11 +2,11 @@
 
 use std::{fs::File, path::Path};
 
-use gyre_messages::{Item, StageId};
-use gyre_run::latency::Durations;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::latency::Durations;
+use gyre_contract::{Item, StageId};
 use gyre_stage::StageError;
 use gyre_supervise::rig::Recorded;
-use gyre_terminal::Failure;
 use serde::Serialize;
 
 use crate::conformance::{

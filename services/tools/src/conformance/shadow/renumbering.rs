@@ -11,7 +11,7 @@
 //! - refinement needs the state before its first item, because each life begins with that state: it
 //!   is started again.
 
-use gyre_messages::{Item, Message, Motion, Pose, StageId, flag};
+use gyre_contract::{Item, Message, Motion, Pose, StageId, flag};
 use gyre_stage::StageError;
 
 use super::observation::{Feedback, Observed};
@@ -158,7 +158,7 @@ fn send_start(shadow: &Harness<'_>, observed: &Observed) -> Result<(), StageErro
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Masked, MaskedHeader};
+    use gyre_contract::{Masked, MaskedHeader};
     use gyre_supervise::rig::Recorded;
 
     use super::*;

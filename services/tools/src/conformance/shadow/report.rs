@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use gyre_run::latency::Percentiles;
+use gyre_contract::run::latency::Percentiles;
 use serde::Serialize;
 
 use super::record::{Counts, Record, Times};

@@ -8,13 +8,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::StageId;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::StageId;
 use gyre_stage::{
     Listener, StageError, clock,
     observer::ObservedRun,
     wake::{MAX_WAIT, Signals},
 };
-use gyre_terminal::Failure;
 
 use super::{
     Options,

@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
+use gyre_configuration::terminal::{Failure, print};
 use gyre_configuration::{Configuration, describe_masks_in_process};
 use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::Twist;
-use gyre_odometry::{Odometry, Outcome};
+use gyre_matching::odometry::{Odometry, Outcome};
 use gyre_radar::OwnedScan;
 use gyre_slam::localisation::Observation;
-use gyre_terminal::{Failure, print};
 
 pub struct Scans {
     dataset: Box<dyn Dataset>,

@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use gyre_configuration::Configuration;
+use gyre_configuration::terminal::Failure;
 use gyre_slam::localisation::{Localiser, Map};
-use gyre_terminal::Failure;
 
 use crate::maps::folder;
 
 /// Opens the map in a folder, and plans localisation in it.
 pub fn open(path: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
     folder::settle(path)?;
-    let drawn = gyre_mapping::Map::open(path)?;
+    let drawn = gyre_slam::mapping::Map::open(path)?;
     let map = Map::open(path)
         .map_err(|error| format!("{} cannot be localised in: {error}", path.display()))?;
     let (path, drawn, kept) = (path.display(), drawn.keyframes(), map.keyframes().len());

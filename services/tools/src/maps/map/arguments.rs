@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use gyre_mapping::Origin;
+use gyre_slam::mapping::Origin;
 
 #[derive(Debug, Args)]
 pub struct MapArguments {

@@ -2,11 +2,11 @@
 
 use std::{fs, path::Path};
 
+use gyre_configuration::terminal::Failure;
 use gyre_geometry::Pose;
-use gyre_mapping::Drawing;
 use gyre_results::{Content, Out};
+use gyre_slam::mapping::Drawing;
 use gyre_slam::{Keyframe, RecordReader, localisation::FoundKeyframe};
-use gyre_terminal::Failure;
 
 use super::{Lines, MapArguments, MapFormat, placing};
 use crate::maps::{folder, localise::searched_map};
@@ -26,7 +26,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     let mut keyframes = super::open(run)?;
     let graph = placing::read_graph(run, keyframes.len())?;
     let mut localiser = searched_map::open(map, &super::configuration(run)?)?;
-    let earlier = gyre_mapping::Map::open(map)?;
+    let earlier = gyre_slam::mapping::Map::open(map)?;
     // Before the search, which takes minutes for a long drive. A drive that is refused makes no
     // folder.
     let lock = || Out::lock_for(out, Content::MAP);

@@ -1,9 +1,9 @@
 //! The keyframes in a map's folder, for localisation.
 
+use gyre_configuration::terminal::Failure;
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_slam::{Keyframe, RecordReader, localisation::Map};
-use gyre_terminal::Failure;
 
 /// Returns the keyframes that have a pose, with their poses in the frame of the first one.
 pub fn placed(keyframes: &mut RecordReader<Keyframe>, poses: &Trajectory) -> Result<Map, Failure> {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use gyre_configuration::terminal::Failure;
 use gyre_results::evaluate::rows;
 use gyre_slam::LoopVerdict;
-use gyre_terminal::Failure;
 use serde::Deserialize;
 
 #[derive(Deserialize)]

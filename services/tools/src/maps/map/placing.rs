@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use gyre_estimation::G2o;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_slam::estimation::G2o;
 use gyre_slam::localisation::{DriveSearch, Localiser, PlacedDrive};
 use gyre_slam::{Keyframe, RecordReader};
 use gyre_storage::StorageError;
-use gyre_terminal::{Failure, print};
 
 /// Corrected keyframes, and the constraints between them.
 const GRAPH: &str = "graph.g2o";

@@ -1,8 +1,8 @@
 //! A snapshot at a run as a screen, or as text.
 
-use gyre_run::latency::HopLatency;
+use gyre_configuration::terminal::wrap;
+use gyre_contract::run::latency::HopLatency;
 use gyre_stage::control::{Activity, ProcessStatus};
-use gyre_terminal::wrap;
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},

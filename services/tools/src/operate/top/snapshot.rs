@@ -5,15 +5,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{PoseHeader, SampleRates, StageId, WitnessCounts, flag};
-use gyre_run::latency::{Latency, LatencyMeter};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::latency::{Latency, LatencyMeter};
+use gyre_contract::{PoseHeader, SampleRates, StageId, WitnessCounts, flag};
 use gyre_stage::{
     clock,
     control::{Control, Status},
     observer::Next,
 };
 use gyre_supervise::Usage;
-use gyre_terminal::Failure;
 
 use super::{Poses, Scans};
 

@@ -11,7 +11,7 @@ use gyre_colossus::{
     asterix::{write_azimuth, write_description},
 };
 
-use gyre_terminal::Failure;
+use gyre_configuration::terminal::Failure;
 
 use super::{Faults, clients::Clients, faults::uniform, unserved};
 use crate::radar_server::RadarServerArguments;

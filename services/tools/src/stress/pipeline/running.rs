@@ -9,8 +9,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Pose, PoseHeader};
-use gyre_run::Scenario;
+use gyre_configuration::terminal::Failure;
+use gyre_contract::run::Scenario;
+use gyre_contract::{Pose, PoseHeader};
 use gyre_stage::{
     StageError,
     observer::{ObservedRun, Observer},
@@ -18,7 +19,6 @@ use gyre_stage::{
 };
 use gyre_storage::create_folder;
 use gyre_supervise::last_line;
-use gyre_terminal::Failure;
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::{Setup, TICK, drain};

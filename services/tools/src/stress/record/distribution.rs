@@ -1,6 +1,6 @@
 //! Percentiles, and their support by samples.
 
-use gyre_run::latency::Durations;
+use gyre_contract::run::latency::Durations;
 use serde::Serialize;
 
 /// The minimum number of samples for a 99th percentile: one is beyond it.

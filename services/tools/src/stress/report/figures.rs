@@ -1,6 +1,6 @@
 //! The figures of a run.
 
-use gyre_messages::WitnessCounts;
+use gyre_contract::WitnessCounts;
 use serde::Serialize;
 
 use crate::stress::{

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_run::{Judged, Scenario};
+use gyre_contract::run::{Judged, Scenario};
 use serde::Serialize;
 
 use super::Figures;

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use gyre_messages::{gyro, outcome};
+use gyre_contract::{gyro, outcome};
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! Faults of the fixes of a log, and which fixes are left out.
 
-use gyre_samples::{LocalPlane, RawFix};
+use gyre_geometry::samples::{LocalPlane, RawFix};
 use serde::Serialize;
 
 use super::LoggedFix;

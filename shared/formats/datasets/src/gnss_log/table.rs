@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use csv::StringRecord;
-use gyre_samples::RawFix;
+use gyre_geometry::samples::RawFix;
 
 use super::OF;
 use crate::{

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use csv::StringRecord;
-use gyre_samples::{Sample, SampleKind};
+use gyre_geometry::samples::{Sample, SampleKind};
 
 use crate::{
     header::{Header, Stamp, endings},

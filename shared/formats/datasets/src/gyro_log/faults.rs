@@ -15,7 +15,7 @@ use crate::{
     LogError,
     table::{Raw, leave_out},
 };
-use gyre_samples::{Sample, SampleKind};
+use gyre_geometry::samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
 const ABSURD_RADPS: f64 = 10.0;

@@ -1,6 +1,6 @@
 //! Jumps: values that change faster than the values of a vehicle can.
 
-use gyre_samples::{Sample, SampleKind};
+use gyre_geometry::samples::{Sample, SampleKind};
 
 use gyre_radar::median;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_radar::median;
-use gyre_samples::{Sample, SampleKind};
 use serde::Serialize;
 use serde_json::{Value, json};
 

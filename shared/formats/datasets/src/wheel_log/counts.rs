@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use csv::StringRecord;
+use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_radar::median;
-use gyre_samples::{Sample, SampleKind};
 
 use super::{OF, SPEEDS};
 use crate::{

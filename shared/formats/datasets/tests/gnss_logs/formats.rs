@@ -1,7 +1,7 @@
 //! Formats.
 
 use gyre_datasets::GnssLog;
-use gyre_samples::GnssConfig;
+use gyre_geometry::samples::GnssConfig;
 use tempfile::TempDir;
 
 use super::{START_NS, read};

@@ -1,7 +1,7 @@
 //! Faults of logs: none of them changes a sample in silence.
 
 use gyre_datasets::LogFaults;
-use gyre_samples::SampleKind;
+use gyre_geometry::samples::SampleKind;
 use proptest::prelude::*;
 
 use super::{START_NS, read};

@@ -1,7 +1,7 @@
 //! Formats.
 
 use gyre_datasets::{Format, SampleLog};
-use gyre_samples::{SampleKind, UpAxis};
+use gyre_geometry::samples::{SampleKind, UpAxis};
 use tempfile::TempDir;
 
 use super::{START_NS, read};

@@ -92,7 +92,7 @@ fn read_ticks(text: &str, m_per_tick: Option<f64>) -> Result<SampleLog, LogError
 
 /// The distance between the first and the last sample, m.
 fn path_m(log: &SampleLog) -> f64 {
-    let of_pair = |pair: &[gyre_samples::Sample]| {
+    let of_pair = |pair: &[gyre_geometry::samples::Sample]| {
         let seconds = (pair[1].stamp_ns - pair[0].stamp_ns) as f64 * 1e-9;
         0.5 * (pair[0].values[0] + pair[1].values[0]) * seconds
     };
@@ -115,7 +115,8 @@ fn counts_become_speeds_whose_way_is_that_of_the_counts() {
         let text = ticks(header, m_per_tick, row);
         let log = read_ticks(&text, (!is_in_metres).then_some(m_per_tick)).unwrap();
         assert_eq!(log.faults, gyre_datasets::LogFaults::default(), "{header}");
-        let at = |sample: &gyre_samples::Sample| (sample.stamp_ns - START_NS) as f64 * 1e-9;
+        let at =
+            |sample: &gyre_geometry::samples::Sample| (sample.stamp_ns - START_NS) as f64 * 1e-9;
         let [first, last] = [log.samples.first(), log.samples.last()].map(|it| at(it.unwrap()));
         let driven = 8.0 * (last - first) + 3.0 * (last.sin() - first.sin());
         let off_m = path_m(&log) - driven;

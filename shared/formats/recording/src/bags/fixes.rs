@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use gyre_datasets::OpenError;
+use gyre_geometry::samples::{BagFixes, RawFix};
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
-use gyre_samples::{BagFixes, RawFix};
 
 use crate::bags::{RecordingError, azimuths::of, bag::Bag, files::files, sensors::Sensor};
 

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
+use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{geometry_msgs::TwistStamped, nav_msgs::Odometry, sensor_msgs::Imu};
-use gyre_samples::{Sample, SampleKind};
 
 use crate::bags::{RecordingError, azimuths::of, bag::Bag, sensors::Sensor};
 

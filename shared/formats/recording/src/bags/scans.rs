@@ -13,9 +13,9 @@ use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError,
     Properties, ReadError, turn_ns,
 };
+use gyre_geometry::samples::{BagFixes, Sample, SampleKind};
 use gyre_radar::{ScanSlot, SweepGeometry};
 use gyre_ros2_messages::radar::DescribedRadar;
-use gyre_samples::{BagFixes, Sample, SampleKind};
 
 use crate::bags::{
     Message, RecordingError,

@@ -2,7 +2,7 @@
 use std::{fs, path::Path, sync::Mutex, thread};
 
 use bytemuck::bytes_of;
-use gyre_messages::PoseHeader;
+use gyre_contract::PoseHeader;
 
 use super::*;
 

@@ -1,12 +1,12 @@
 //! Samples of inertial sensors and of wheels in bags.
 
 use gyre_datasets::SampleLog;
+use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{
     geometry_msgs::{TwistStamped, Vector3},
     sensor_msgs::Imu,
     std_msgs::Header,
 };
-use gyre_samples::{Sample, SampleKind};
 
 use super::*;
 

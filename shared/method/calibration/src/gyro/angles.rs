@@ -1,5 +1,5 @@
+use gyre_geometry::samples::Sample;
 use gyre_radar::median;
-use gyre_samples::Sample;
 use nalgebra::Vector3;
 
 /// The integrals of the three rates of a log, s since the first scan on the log's own clock.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gyre_samples::{GyroConfig, UpAxis};
+use gyre_geometry::samples::{GyroConfig, UpAxis};
 
 use super::ClockError;
 use crate::Estimate;

@@ -1,6 +1,6 @@
 //! The axis and the offset that make the gyro turn as the radar.
 
-use gyre_samples::UpAxis;
+use gyre_geometry::samples::UpAxis;
 
 use super::{
     MAX_LATE_S,

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use gyre_samples::{GyroConfig, Sample, SampleKind, UpAxis};
+use gyre_geometry::samples::{GyroConfig, Sample, SampleKind, UpAxis};
 use proptest::prelude::*;
 
 use super::*;

@@ -44,14 +44,14 @@ pub(crate) enum Engine {
 }
 
 impl PlanesNetwork {
-    /// Loads the network of a name in `gyre_shipped`, into the ONNX Runtime at a path or, without
+    /// Loads the network of a name in `gyre_storage::shipped`, into the ONNX Runtime at a path or, without
     /// one, into rten, which takes several times as long.
     pub fn load(
         name: &'static str,
         runtime: Option<&Path>,
         shapes: [[usize; 3]; 2],
     ) -> Result<Self, PlanesError> {
-        let bytes = gyre_shipped::bytes(Path::new(name)).unwrap_or_default();
+        let bytes = gyre_storage::shipped::bytes(Path::new(name)).unwrap_or_default();
         Self::of(name, bytes, runtime, shapes)
     }
 

@@ -1,7 +1,7 @@
 //! The velocity on which most bearings agree: by vote, then by least squares with weights that what
 //! contradicts loses (Tukey's biweight).
 
-use gyre_samples::DopplerVelocity;
+use gyre_geometry::samples::DopplerVelocity;
 use nalgebra::{Matrix2, Vector2};
 
 use super::{NoDoppler, rows::REACH, shifts::RowShifts};

@@ -101,7 +101,7 @@ fn measured(sensor: &Sensor, scatterers: &[Scatterer], velocity: Vector2<f64>) -
     scan
 }
 
-fn estimate(scan: &OwnedScan) -> Result<gyre_samples::DopplerVelocity, NoDoppler> {
+fn estimate(scan: &OwnedScan) -> Result<gyre_geometry::samples::DopplerVelocity, NoDoppler> {
     DopplerEstimator::default().estimate(&scan.view(), MIN_RANGE_M)
 }
 

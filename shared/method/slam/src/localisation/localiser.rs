@@ -1,8 +1,8 @@
 use std::f64::consts::PI;
 
-use gyre_estimation::places::{Candidate, Describer, Descriptor, Registrar};
+use crate::estimation::places::{Candidate, Describer, Descriptor, Registrar};
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle, xy_yaw};
-use gyre_scan_matching::{RefinementConfig, SettingError, Submap};
+use gyre_matching::{RefinementConfig, SettingError, Submap};
 use nalgebra::{Matrix3, Point2};
 
 use crate::localisation::{Map, sight::Sight};

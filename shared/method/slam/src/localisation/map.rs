@@ -1,12 +1,12 @@
 use std::path::Path;
 
-use crate::{Keyframe, Record, RecordLog, RecordReader};
-use gyre_estimation::places::{
+use crate::estimation::places::{
     Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceFileError, PlaceIndex,
     SUBMAP_REACH_M, neighbours,
 };
+use crate::{Keyframe, Record, RecordLog, RecordReader};
 use gyre_geometry::Pose;
-use gyre_scan_matching::Submap;
+use gyre_matching::Submap;
 use gyre_storage::LogError;
 use nalgebra::Point2;
 use thiserror::Error;

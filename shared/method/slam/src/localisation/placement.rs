@@ -6,7 +6,7 @@
 use std::collections::HashSet;
 
 use crate::Keyframe;
-use gyre_estimation::{
+use crate::estimation::{
     CHI_SQUARE_99_9, Constraint, EstimationError, G2o, GraphOptions, Kind, PoseGraph,
 };
 use gyre_geometry::{Pose, UncertainMotion};

@@ -1,6 +1,6 @@
 use std::f64::consts::TAU;
 
-use gyre_scan_matching::Submap;
+use gyre_matching::Submap;
 use ndarray::{Array2, ArrayView2};
 
 const SECTORS: usize = 72;

@@ -2,9 +2,7 @@
 //! checksum of the rest.
 
 use gyre_geometry::Twist;
-use gyre_scan_matching::{
-    Anchor, Heading, Keyframe, Standstill, TrackerState, Verdict, WheelState,
-};
+use gyre_matching::{Anchor, Heading, Keyframe, Standstill, TrackerState, Verdict, WheelState};
 use gyre_storage::Checksum;
 use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
 

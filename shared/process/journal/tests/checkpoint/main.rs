@@ -6,13 +6,13 @@ mod processes;
 
 use std::{fs, path::Path};
 
+use gyre_contract::{Item, MotionEstimate, PoseHeader};
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
     JournalError,
     checkpoint::{self, Checkpoint},
 };
-use gyre_messages::{Item, MotionEstimate, PoseHeader};
-use gyre_scan_matching::{Keyframe, RefinementConfig, Refiner};
+use gyre_matching::{Keyframe, RefinementConfig, Refiner};
 use nalgebra::{Isometry2, Vector2};
 
 const WINDOW: usize = 8;

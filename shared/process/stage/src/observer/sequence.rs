@@ -1,6 +1,6 @@
 //! The position of an observer among the items of a topic.
 
-use gyre_messages::{GivenAnew, Item, flag};
+use gyre_contract::{GivenAnew, Item, flag};
 
 /// The position in a sequence of items that are consecutive at the publisher, until it reuses
 /// numbers.

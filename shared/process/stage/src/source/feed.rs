@@ -2,7 +2,7 @@
 
 use std::{mem, os::fd::BorrowedFd, time::Duration};
 
-use gyre_messages::{Hop, Item, Pose, Scan, StageId, flag};
+use gyre_contract::{Hop, Item, Pose, Scan, StageId, flag};
 
 use crate::{
     Launch, Listener, StageCounters, StageError, clock,

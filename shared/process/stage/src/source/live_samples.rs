@@ -9,8 +9,8 @@ use std::{
     time::Duration,
 };
 
-use gyre_messages::ScanHeader;
-use gyre_samples::{
+use gyre_contract::ScanHeader;
+use gyre_geometry::samples::{
     GyroConfig, GyroKind, LiveSamples, LiveSensor, MAX_SAMPLES, Sample, SampleKind, WheelsConfig,
     WheelsKind,
 };

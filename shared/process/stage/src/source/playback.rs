@@ -1,8 +1,8 @@
 //! Playing: which scan is next, when it is due, and when the window admits it.
 
-use gyre_messages::Scan;
+use gyre_contract::Scan;
+use gyre_contract::run::SourceConfig;
 use gyre_radar::continues;
-use gyre_run::SourceConfig;
 
 use super::{Attempts, Feed, PAUSE, Source, Unreadable, hop, pace::Pace, position::Position};
 use crate::{StageError, clock, counters::Work, wake, writer::Draft};

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use gyre_messages::{Item, Scan, StageId, flag};
+use gyre_contract::{Item, Scan, StageId, flag};
 
 use super::{Feed, Pace, hop};
 use crate::{

@@ -1,6 +1,6 @@
 //! The position of the source in a recording.
 
-use gyre_messages::{Item, flag};
+use gyre_contract::{Item, flag};
 
 /// The next scan to read, and its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

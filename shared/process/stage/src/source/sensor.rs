@@ -3,8 +3,8 @@
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
-use gyre_messages::{NumberedBy, Scan, ScanHeader, StageId};
-use gyre_samples::{Sample, SampleKind};
+use gyre_contract::{NumberedBy, Scan, ScanHeader, StageId};
+use gyre_geometry::samples::{Sample, SampleKind};
 
 use super::{
     Feed, hop,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_messages::{Fix, Item, Loop, LoopHeader, Message};
+use gyre_contract::{Fix, Item, Loop, LoopHeader, Message};
 
 use super::{Run, WINDOW, node, writer};
 use crate::{

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use gyre_messages::{GivenAnew, Item, NumberedBy};
+use gyre_contract::{GivenAnew, Item, NumberedBy};
 
 use super::Run;
 use crate::{Generation, generation::skipped};

@@ -1,6 +1,6 @@
 //! The items that a reader receives when it subscribes late or the publisher restarts.
 
-use gyre_messages::{Message, Pose, flag};
+use gyre_contract::{Message, Pose, flag};
 
 use super::{Run, WINDOW, reader, send, writer};
 use crate::reader::Reader;

@@ -2,7 +2,7 @@
 
 use std::{path::Path, rc::Rc, time::Duration};
 
-use gyre_messages::{
+use gyre_contract::{
     Correction, Fix, Footprint, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation,
     Scan, flag,
 };

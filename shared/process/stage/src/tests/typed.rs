@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use gyre_messages::{
+use gyre_contract::{
     Correction, Element, Fix, Header, Item, Loop, Masked, Message, Motion, Objects, Pose,
     PoseHeader, Refined, Rotation, Scan,
 };

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::Pose;
+use gyre_contract::Pose;
 
 use super::{Run, WINDOW, reader, send, writer};
 use crate::{transport::bind_alone, wake::Signals};

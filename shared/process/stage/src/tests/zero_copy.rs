@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use gyre_messages::{Masked, MaskedHeader, StageId};
+use gyre_contract::{Masked, MaskedHeader, StageId};
 
 use super::{Run, reader, writer};
 

@@ -1,6 +1,6 @@
 //! Topics of the transport.
 
-use gyre_messages::{Topic, Window, WireType};
+use gyre_contract::{Topic, Window, WireType};
 use iceoryx2::{
     prelude::{CallbackProgression, PortFactory},
     service::{

@@ -1,6 +1,6 @@
 //! A message as a value.
 
-use gyre_messages::{Item, Message};
+use gyre_contract::{Item, Message};
 use gyre_stage::{StageError, writer::TopicWriter};
 
 use super::Tap;

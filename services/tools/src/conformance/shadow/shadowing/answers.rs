@@ -1,9 +1,9 @@
 //! The messages of the shadow: examined against the contract, and compared with the result of the
 //! run for the same item.
 
-use gyre_messages::{Item, flag};
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{Item, flag};
 use gyre_supervise::rig::Recorded;
-use gyre_terminal::Failure;
 
 use super::{Shadowing, UnderWay};
 use crate::conformance::{

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::LogFaults;
 use crate::stretches::{between, longest_chain};
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 
 /// A step of the stamps by more than this, ns, parts stretches; back it is no disorder but a step
 /// of the clock.

@@ -3,7 +3,7 @@
 use gyre_radar::median;
 
 use super::LogFaults;
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 
 /// A burst is spread over at most so many times the time that as many samples take otherwise:
 /// before a longer one samples were lost.

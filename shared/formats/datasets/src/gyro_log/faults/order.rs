@@ -3,7 +3,7 @@
 use gyre_radar::median;
 
 use super::LogFaults;
-use gyre_samples::Sample;
+use gyre_geometry::samples::Sample;
 
 /// A late sample fills a hole if it is at least so many periods from its neighbours: more than half
 /// a period, since one between two others is at most that far from the nearer.

@@ -1,0 +1,103 @@
+//! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
+//! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map.
+
+use gyre_contract::{Fix, FixHeader, Item, fix_status};
+use gyre_geometry::{covariance, xy_yaw};
+use gyre_matching::RefinementConfig;
+use gyre_radar::points::PointsConfig;
+use gyre_slam::localisation::{Localisation, Localiser, Map, Observation, Status};
+use gyre_slam::{Keyframe, RecordReader, SlamConfig};
+use gyre_stage::{
+    Follower, Launch, StageCounters, StageError,
+    follower::{self, LogId, Progress, Step},
+};
+
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    let slam: SlamConfig = launch.section("slam")?;
+    let refinement: RefinementConfig = launch.section("refinement")?;
+    let points: PointsConfig = launch.section("points")?;
+    let map = Map::open(&slam.map).map_err(StageError::input)?;
+    let localiser = Localiser::new(map, &refinement, points.capacity);
+    launch.take_place()?;
+    let mut places = Fixes {
+        keyframes: RecordReader::open(&launch.manifest.out)?,
+        localiser: localiser.map_err(StageError::input)?,
+        read: 0,
+    };
+    follower::run(launch, &mut places)
+}
+
+struct Fixes {
+    keyframes: RecordReader<Keyframe>,
+    localiser: Localiser,
+    read: usize,
+}
+
+impl Fixes {
+    /// Looks for new keyframes. If some of the keyframes that were read have been cut off, it
+    /// restarts from the first keyframe.
+    fn look(&mut self) -> Result<(), StageError> {
+        self.keyframes.refresh()?;
+        if self.keyframes.unchanged() < self.read {
+            self.localiser.reset();
+            self.read = 0;
+        }
+        Ok(())
+    }
+
+    fn locate_next(&mut self) -> Result<FixHeader, StageError> {
+        let keyframe = self.keyframes.read(self.read)?;
+        let found = self.localiser.locate(&Observation {
+            stamp_ns: keyframe.stamp_ns,
+            points: &keyframe.points,
+            twist: keyframe.twist,
+            motion: keyframe.motion,
+        });
+        let header = header(self.read, &keyframe, &found, self.localiser.map());
+        self.read += 1;
+        Ok(header)
+    }
+}
+
+impl Follower for Fixes {
+    type Output = Fix;
+    const LOGS: &'static [LogId] = &[LogId::Keyframes];
+
+    fn step(&mut self) -> Result<Step<FixHeader>, StageError> {
+        self.look()?;
+        if self.read < self.keyframes.len() {
+            return Ok(Step::Worked(Some(self.locate_next()?)));
+        }
+        Ok(match self.keyframes.has_ended() {
+            true => Step::Ended,
+            false => Step::Idle,
+        })
+    }
+
+    fn progress(&self) -> Progress {
+        Progress::of(self.read, self.keyframes.len())
+    }
+}
+
+fn header(index: usize, keyframe: &Keyframe, found: &Localisation, map: &Map) -> FixHeader {
+    let mut header = FixHeader {
+        item: Item::recorded(index as u64, keyframe.scan, keyframe.stamp_ns),
+        keyframe_seq: keyframe.seq,
+        status: match found.status {
+            Status::Lost => fix_status::LOST,
+            Status::Found => fix_status::FOUND,
+            Status::Tracked => fix_status::TRACKED,
+            // Away from the map a prediction is no place.
+            Status::Predicted if found.fix.is_none() => fix_status::LOST,
+            Status::Predicted => fix_status::PREDICTED,
+        },
+        ..FixHeader::default()
+    };
+    if let Some(fix) = &found.fix {
+        header.place = map.keyframes()[fix.keyframe].scan;
+        [header.x_m, header.y_m, header.yaw_rad] = xy_yaw(&fix.pose.motion);
+        header.covariance = covariance::pack(&fix.pose.covariance);
+        header.correlation = fix.correlation;
+    }
+    header
+}

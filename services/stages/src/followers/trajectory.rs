@@ -1,0 +1,264 @@
+//! The trajectory that agrees with the loops: follows `journal/keyframes.log` and
+//! `journal/loops.log`, and the fixes of GNSS, which for a live receiver are written to
+//! `journal/gnss.csv` here. New loops and fixes update the standing estimate; when both logs have
+//! ended, the poses are solved again, so that the last correction equals the results.
+
+use std::{mem, path::Path};
+
+use gyre_contract::run::SourceConfig;
+use gyre_contract::{Correction, CorrectionHeader, Item};
+use gyre_geometry::samples::GnssConfig;
+use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
+use gyre_recording::{ReceivedFixes, received_fixes};
+use gyre_slam::{
+    EstimatorKind, Fixes, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig,
+    TrajectoryEstimator,
+};
+use gyre_stage::{
+    Follower, GnssReceiver, Launch, StageCounters, StageError,
+    follower::{self, LogId, Progress, Step},
+};
+
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    launch.take_place()?;
+    let slam: SlamConfig = launch.section("slam")?;
+    let kind = slam.kind.estimator().ok_or_else(|| {
+        StageError::Input("slam.kind is none: there is no trajectory to correct".to_owned())
+    })?;
+    let out = &launch.manifest.out;
+    let config: GnssConfig = launch.section("gnss")?;
+    let mut trajectory = Trajectory::open(out, kind, fixes(launch, &config)?)?;
+    // One that is started after the last scan receives no more: that may be of another drive.
+    if config.is_live() && !trajectory.keyframes.has_ended() {
+        trajectory.live_fixes = Some(LiveFixes::open(config, out)?);
+    }
+    follower::run(launch, &mut trajectory)
+}
+
+/// Returns the fixes of GNSS that are known by now; none without `[gnss]`.
+fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
+    let source: SourceConfig = launch.section("source")?;
+    let out = &launch.manifest.out;
+    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(StageError::input)?;
+    let fixes = log.map(|log| log.on_radar(config)).unwrap_or_default();
+    Ok(Fixes::new(fixes, config))
+}
+
+struct Trajectory {
+    kind: EstimatorKind,
+    /// The fixes that are later than all keyframes.
+    fixes: Fixes,
+    live_fixes: Option<LiveFixes>,
+    keyframes: RecordReader<Keyframe>,
+    queries: RecordReader<Query>,
+    estimator: TrajectoryEstimator,
+    newest: Option<Keyframe>,
+    read: [usize; 2],
+    /// The pose of the newest keyframe as corrected; `None` if loops were read since that have
+    /// corrected no pose yet.
+    corrected: Option<UncertainMotion>,
+    /// True if the poses equal the results.
+    is_final: bool,
+    has_changed: bool,
+}
+
+impl Trajectory {
+    fn open(out: &Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
+        Ok(Self {
+            kind,
+            keyframes: RecordReader::open(out)?,
+            queries: RecordReader::open(out)?,
+            estimator: TrajectoryEstimator::new(kind).with_fixes(fixes.clone()),
+            fixes,
+            live_fixes: None,
+            newest: None,
+            read: [0, 0],
+            corrected: None,
+            is_final: false,
+            has_changed: false,
+        })
+    }
+
+    /// Looks for new records. If some of the records that were read have been cut off, it restarts
+    /// from the first record.
+    fn look(&mut self) -> Result<(), StageError> {
+        self.keyframes.refresh()?;
+        self.queries.refresh()?;
+        let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
+        let mut read = self.read.iter().zip(unchanged);
+        if read.any(|(read, unchanged)| unchanged < *read) {
+            self.estimator = TrajectoryEstimator::new(self.kind).with_fixes(self.fixes.clone());
+            (self.newest, self.corrected, self.read) = (None, None, [0, 0]);
+            (self.is_final, self.has_changed) = (false, false);
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<bool, StageError> {
+        let [keyframes, queries] = self.read;
+        if keyframes < self.keyframes.len() {
+            let keyframe = self.keyframes.read_without_points(keyframes)?;
+            let fixes = self.estimator.fixes().settled();
+            self.estimator.push(&keyframe).map_err(StageError::input)?;
+            // Without a new loop or fix the poses before stay where they are.
+            let standing = self.corrected.map(|last| last.then(&keyframe.motion));
+            self.corrected = standing.filter(|_| self.estimator.fixes().settled() == fixes);
+            self.newest = Some(keyframe);
+            self.read[0] += 1;
+        } else if queries < self.queries.len() {
+            let query = self.queries.read(queries)?;
+            if query.keyframe >= keyframes {
+                // Its keyframe has been cut off, and the query will be.
+                return Ok(false);
+            }
+            if query.loops().next().is_some() {
+                self.corrected = None;
+            }
+            self.estimator.close(&query).map_err(StageError::input)?;
+            self.read[1] += 1;
+        } else {
+            return Ok(false);
+        }
+        self.has_changed = true;
+        Ok(true)
+    }
+
+    /// Takes the fixes that have arrived; at the end of the run all of them.
+    fn take_live_fixes(&mut self) -> Result<(), StageError> {
+        let Some(live) = &mut self.live_fixes else {
+            return Ok(());
+        };
+        if let Some(fixes) = live.take(self.is_final)? {
+            self.fixes = fixes.clone();
+            if self.estimator.replace_fixes(fixes) {
+                self.corrected = None;
+            }
+        }
+        Ok(())
+    }
+
+    fn correct(&mut self) -> Result<Option<CorrectionHeader>, StageError> {
+        let Some(newest) = &self.newest else {
+            return Ok(None);
+        };
+        let [keyframes, queries] = self.read;
+        let corrected = match self.corrected {
+            Some(corrected) => corrected,
+            None => {
+                match self.is_final {
+                    true => self.estimator.solve().map_err(StageError::input)?,
+                    false => self.estimator.update().map_err(StageError::input)?,
+                }
+                self.estimator
+                    .pose(keyframes - 1)
+                    .map_err(StageError::input)?
+            }
+        };
+        self.corrected = Some(corrected);
+        let loops = self.estimator.loops().iter();
+        let used = loops.filter(|it| it.verdict == LoopVerdict::Used);
+        let map_from_odometry = corrected.motion * newest.pose.motion.inverse();
+        let [x_m, y_m, yaw_rad] = xy_yaw(&map_from_odometry);
+        let seq = (keyframes + queries + usize::from(self.is_final)) as u64 - 1;
+        Ok(Some(CorrectionHeader {
+            item: Item::recorded(seq, newest.scan, newest.stamp_ns),
+            keyframe_seq: newest.seq,
+            keyframes: keyframes as u64,
+            loops: used.count() as u64,
+            x_m,
+            y_m,
+            yaw_rad,
+            keyframe_covariance: covariance::pack(&corrected.covariance),
+        }))
+    }
+}
+
+impl Follower for Trajectory {
+    type Output = Correction;
+    const LOGS: &'static [LogId] = &[LogId::Keyframes, LogId::Loops];
+
+    fn step(&mut self) -> Result<Step<CorrectionHeader>, StageError> {
+        if self.advance()? {
+            return Ok(Step::Worked(None));
+        }
+        self.look()?;
+        if self.advance()? {
+            return Ok(Step::Worked(None));
+        }
+        // The queries end after the keyframes.
+        let has_ended = self.queries.has_ended() && self.keyframes.has_ended();
+        if has_ended && !self.is_final {
+            (self.has_changed, self.corrected) = (true, None);
+        }
+        self.is_final = has_ended;
+        if mem::take(&mut self.has_changed) {
+            self.take_live_fixes()?;
+            return Ok(Step::Worked(self.correct()?));
+        }
+        Ok(match has_ended {
+            true => Step::Ended,
+            false => Step::Idle,
+        })
+    }
+
+    fn sync(&mut self) -> Result<(), StageError> {
+        let received = self.live_fixes.as_mut();
+        received.map_or(Ok(()), LiveFixes::finish)
+    }
+
+    fn progress(&self) -> Progress {
+        Progress::of(self.read[1], self.keyframes.len())
+    }
+}
+
+/// The time to examine all fixes grows with their number. So during the run they are examined when
+/// one in so many is new: after ten hours at 20 Hz that is every 18 s.
+const NEW_SHARE: usize = 2000;
+
+struct LiveFixes {
+    receiver: GnssReceiver,
+    config: GnssConfig,
+    received: ReceivedFixes,
+    examined: usize,
+}
+
+impl LiveFixes {
+    fn open(config: GnssConfig, out: &Path) -> Result<Self, StageError> {
+        let log = received_fixes(out);
+        Ok(Self {
+            receiver: GnssReceiver::open(&config.listen, &log)?,
+            received: ReceivedFixes::new(&log),
+            examined: 0,
+            config,
+        })
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        self.receiver.finish()
+    }
+
+    /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
+    /// With `is_last` nothing is received after this.
+    fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, StageError> {
+        if is_last {
+            self.finish()?;
+        }
+        let received = &mut self.received;
+        let read = self.receiver.if_grown(|| received.read_on())?;
+        read.unwrap_or(Ok(())).map_err(StageError::input)?;
+        let new = self.received.count() - self.examined;
+        let least = if is_last {
+            1
+        } else {
+            self.examined / NEW_SHARE + 1
+        };
+        Ok((new >= least).then(|| {
+            self.examined += new;
+            let fixes = self.received.log().on_radar(&self.config);
+            Fixes::new(fixes, &self.config)
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,244 @@
+#![allow(clippy::unwrap_used)]
+
+use std::{f64::consts::TAU, iter::successors, net::UdpSocket};
+
+use gyre_geometry::samples::{Geographic, GnssFix, GnssKind, LocalPlane};
+use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
+use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
+use nalgebra::{Matrix3, Vector3};
+
+use super::*;
+
+fn uncertain(x_m: f64, y_m: f64, yaw_rad: f64) -> UncertainMotion {
+    UncertainMotion {
+        motion: pose(x_m, y_m, yaw_rad),
+        covariance: Matrix3::from_diagonal(&Vector3::new(0.01, 0.01, 0.0001)),
+    }
+}
+
+/// Laps of 40 keyframes whose odometry turns too little.
+fn keyframe(index: usize) -> Keyframe {
+    let motion = uncertain(3.0, 0.0, TAU / 40.0 - 0.0005);
+    let poses = successors(Some(pose(0.0, 0.0, 0.0)), |at| Some(at * motion.motion));
+    let [x_m, y_m, yaw_rad] = poses.skip(index).map(|at| xy_yaw(&at)).next().unwrap();
+    Keyframe {
+        seq: 2 * index as u64,
+        scan: 5 * index as u64,
+        stamp_ns: 7 * index as i64,
+        pose: uncertain(x_m, y_m, yaw_rad),
+        motion,
+        noise: Matrix3::zeros(),
+        twist: Twist::default(),
+        path_m: 3.0 * index as f64,
+        points: Vec::new(),
+    }
+}
+
+/// Each keyframe is at the place of the one a lap before.
+fn query(keyframe: usize) -> Query {
+    let candidate = |place| LoopCandidate {
+        place,
+        similarity: 0.9,
+        motion: uncertain(0.1, -0.05, 0.0),
+        correlation: 0.9,
+        searched: 0.9,
+        runner_up: 0.3,
+        chi_square: 1.0,
+        outcome: LoopOutcome::Accepted,
+    };
+    let candidates = keyframe.checked_sub(40).map(candidate);
+    Query {
+        keyframe,
+        candidates: candidates.into_iter().collect(),
+    }
+}
+
+struct Logs {
+    out: tempfile::TempDir,
+    fixes: Fixes,
+    keyframes: RecordLog<Keyframe>,
+    queries: RecordLog<Query>,
+}
+
+impl Logs {
+    fn new() -> Self {
+        let out = tempfile::tempdir().unwrap();
+        Self {
+            keyframes: RecordLog::open(out.path()).unwrap(),
+            queries: RecordLog::open(out.path()).unwrap(),
+            fixes: Fixes::default(),
+            out,
+        }
+    }
+
+    fn append(&mut self, keyframes: usize, queries: usize) {
+        for index in self.keyframes.len()..keyframes {
+            self.keyframes.append(&keyframe(index)).unwrap();
+        }
+        for index in self.queries.len()..queries {
+            self.queries.append(&query(index)).unwrap();
+        }
+    }
+
+    /// Ends the logs. The last correction is the same as after a restart.
+    fn end_and_compare(&mut self, trajectory: &mut Trajectory) -> CorrectionHeader {
+        self.keyframes.end().unwrap();
+        self.queries.end().unwrap();
+        let (correction, has_ended) = follow(trajectory);
+        assert!(has_ended);
+        let (restarted, _) = follow(&mut self.trajectory());
+        assert_eq!(text(restarted), text(correction));
+        correction.unwrap()
+    }
+
+    fn trajectory(&self) -> Trajectory {
+        Trajectory::open(self.out.path(), EstimatorKind::Graph, self.fixes.clone()).unwrap()
+    }
+}
+
+fn follow(trajectory: &mut Trajectory) -> (Option<CorrectionHeader>, bool) {
+    let mut last = None;
+    loop {
+        match trajectory.step().unwrap() {
+            Step::Worked(correction) => last = correction.or(last),
+            Step::Idle => return (last, false),
+            Step::Ended => return (last, true),
+        }
+    }
+}
+
+fn text(correction: Option<CorrectionHeader>) -> String {
+    format!("{:?}", correction.unwrap())
+}
+
+#[test]
+fn without_loops_odometry_is_not_corrected() {
+    let mut logs = Logs::new();
+    logs.append(30, 20);
+    let (correction, has_ended) = follow(&mut logs.trajectory());
+    let correction = correction.unwrap();
+    let identity = xy_yaw(&correction.map_from_odometry());
+    assert!(identity.iter().all(|it| it.abs() < 1e-9), "{identity:?}");
+    assert!(!has_ended && correction.loops == 0 && correction.keyframes == 30);
+    assert_eq!((correction.item.scan, correction.keyframe_seq), (145, 58));
+}
+
+#[test]
+fn the_last_correction_is_the_same_whenever_the_logs_were_read() {
+    let mut logs = Logs::new();
+    let mut trajectory = logs.trajectory();
+    assert!(follow(&mut trajectory).0.is_none());
+    for (keyframes, queries) in [(10, 0), (45, 41), (70, 41), (70, 70), (90, 85)] {
+        logs.append(keyframes, queries);
+        follow(&mut trajectory);
+    }
+    logs.append(120, 120);
+    let standing = follow(&mut trajectory).0.unwrap().map_from_odometry();
+    let restarted = follow(&mut logs.trajectory()).0.unwrap();
+    let apart = standing.inv_mul(&restarted.map_from_odometry());
+    assert!(apart.translation.vector.norm() < 0.001, "{apart}");
+    assert!(apart.rotation.angle().abs() < 1e-5, "{apart}");
+    let correction = logs.end_and_compare(&mut trajectory);
+    assert_eq!(correction.item.seq, 240);
+    assert!(correction.loops > 0 && correction.yaw_rad.abs() > 0.001);
+}
+
+#[test]
+fn what_is_cut_off_the_logs_is_taken_back() {
+    let mut logs = Logs::new();
+    logs.append(90, 85);
+    let mut trajectory = logs.trajectory();
+    follow(&mut trajectory);
+    logs.queries.cut(60).unwrap();
+    logs.keyframes.cut(80).unwrap();
+    logs.append(81, 70);
+    let (correction, _) = follow(&mut trajectory);
+    let (restarted, _) = follow(&mut logs.trajectory());
+    assert_eq!(text(correction), text(restarted));
+    assert_eq!(correction.unwrap().keyframes, 81);
+}
+
+/// The poses of the laps as they are, without the error of odometry.
+fn laps(first: Pose) -> impl Iterator<Item = (i64, Pose)> {
+    let step = pose(3.0, 0.0, TAU / 40.0);
+    (0..120).zip(successors(Some(first), move |at| Some(at * step)))
+}
+
+fn fixes() -> Fixes {
+    let fix = |(index, at): (i64, Pose)| GnssFix {
+        stamp_ns: 7 * index,
+        east_m: at.translation.x,
+        north_m: at.translation.y,
+        sigma_m: 0.1,
+    };
+    let fixes = laps(pose(70.0, -20.0, 1.0)).map(fix).collect();
+    Fixes::new(fixes, &GnssConfig::default())
+}
+
+#[test]
+fn fixes_correct_as_keyframes_come_and_the_last_correction_is_that_of_the_results() {
+    let mut logs = Logs {
+        fixes: fixes(),
+        ..Logs::new()
+    };
+    let mut trajectory = logs.trajectory();
+    for keyframes in [10, 50, 90, 119] {
+        logs.append(keyframes, 0);
+        follow(&mut trajectory);
+    }
+    logs.append(120, 120);
+    let turned_rad = follow(&mut trajectory).0.unwrap().yaw_rad;
+    // Odometry turns by 0.0005 rad too little at each keyframe.
+    assert!((turned_rad - 0.06).abs() < 0.02, "{turned_rad}");
+    logs.end_and_compare(&mut trajectory);
+}
+
+/// The lines that a live receiver sends of the same fixes.
+fn lines() -> String {
+    let place = Geographic {
+        latitude_deg: 51.75,
+        longitude_deg: -1.26,
+    };
+    let plane = LocalPlane::new(place, 0.0);
+    let line = |(index, at): (i64, Pose)| {
+        let place = plane.place([at.translation.x, at.translation.y]);
+        let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
+        format!("{},{latitude},{longitude},0.1\n", 7 * index)
+    };
+    laps(pose(0.0, 0.0, 1.0)).map(line).collect()
+}
+
+#[test]
+fn fixes_that_arrive_are_logged_and_the_last_correction_is_that_of_the_log() {
+    let mut logs = Logs::new();
+    // Senders take their ports on 127.0.0.1, so that this one stays free.
+    let free = UdpSocket::bind("127.0.0.2:0").unwrap();
+    let address = free.local_addr().unwrap();
+    drop(free);
+    let config = GnssConfig {
+        kind: GnssKind::Udp,
+        listen: address.to_string(),
+        ..GnssConfig::default()
+    };
+    let mut trajectory = logs.trajectory();
+    let live = LiveFixes::open(config.clone(), logs.out.path()).unwrap();
+    trajectory.live_fixes = Some(live);
+    logs.append(50, 0);
+    follow(&mut trajectory);
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    sender.send_to(lines().as_bytes(), address).unwrap();
+    sender.send_to(b"no fix", address).unwrap();
+    logs.append(120, 120);
+    logs.keyframes.end().unwrap();
+    logs.queries.end().unwrap();
+    let (correction, has_ended) = follow(&mut trajectory);
+    assert!(has_ended);
+    let yaw_rad = correction.unwrap().yaw_rad;
+    assert!((yaw_rad - 0.06).abs() < 0.02, "{yaw_rad}");
+    let log = gyre_recording::gnss_log(&config, Path::new(""), logs.out.path());
+    let log = log.unwrap().unwrap();
+    assert_eq!((log.fixes.len(), log.faults.unreadable), (120, 1));
+    logs.fixes = Fixes::new(log.on_radar(&config), &config);
+    let (restarted, _) = follow(&mut logs.trajectory());
+    assert_eq!(text(restarted), text(correction));
+}

@@ -1,0 +1,260 @@
+//! The section `[source]`: where scans come from, and the faults to inject into them.
+
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+crate::named! {
+    /// Where scans come from.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum SourceKind {
+        /// A recording, or a simulation.
+        #[default]
+        Recording = "recording",
+        /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
+        Colossus = "colossus",
+        /// A Navtech radar behind its driver in ROS 2.
+        Ros2 = "ros2",
+    }
+}
+
+/// The source of scans: section `[source]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SourceConfig {
+    /// `recording`; or in live mode `colossus`, a Navtech radar on the network, or `ros2`, one
+    /// behind its driver in ROS 2. Then `data`, `first`, `retry_s` and `max_unreadable` are not
+    /// used.
+    pub kind: SourceKind,
+    /// Address of the radar, as in `192.168.0.1`; its port is 6317 unless it is given.
+    /// `udp://GROUP:PORT`: where a radar sends to whose data output is CAT-240, as in
+    /// `udp://239.192.43.78:4378`.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub address: String,
+    /// Topic of ROS 2 on which Navtech's driver publishes azimuths, as in `/radar_data/fft_data`;
+    /// `--ros2` on the command line. Its configuration is beside it,
+    /// `/radar_data/configuration_data`.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub topic: String,
+    /// Domain of ROS 2. Default: `ROS_DOMAIN_ID`, or 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub domain: Option<u16>,
+    /// Address of this machine on the network of a radar that sends to a multicast group, as in
+    /// `192.168.0.2`. Default: the system chooses. Of ROS 2 the only network that is used; default:
+    /// all.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub interface: String,
+    /// Time without an azimuth before the radar is connected again, or in ROS 2 before that is
+    /// reported, s; 0: no limit.
+    pub silence_s: f64,
+    /// Folder of the recording.
+    pub data: PathBuf,
+    /// First topic that is played from a recording of a run: `scan`, `masked`, `rotation`, `motion`
+    /// or `refined`; `--from` on the command line. The stages before it are absent. Of all but
+    /// `scan` every message must have been recorded.
+    #[serde(skip_serializing_if = "crate::run::unset::is_default")]
+    pub from: PlayedFrom,
+    /// First scan to play, from 0.
+    pub first: usize,
+    /// Number of scans to play. Default: all, and of a radar without end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scans: Option<usize>,
+    /// Play the recording again and again, with times that advance: `gyre stress`. `scans` then
+    /// counts the scans of all turns; without it the run has no end.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(skip)]
+    pub repeat: bool,
+    /// Number of scans that become due at once, as from a network that holds them back; the mean
+    /// rate stays. They follow each other as fast as they are decoded. Only with a `run.rate` other
+    /// than `max`.
+    #[serde(skip_serializing_if = "is_one")]
+    #[schemars(skip)]
+    pub burst: NonZeroUsize,
+    /// Faults to inject into the playback of a recording: `gyre stress`. As in `[{ kind =
+    /// "gyro-out", from_s = 4.0, for_s = 3.0 }]`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(skip)]
+    pub faults: Vec<PlayedFault>,
+    /// Time for which a file that the disk or the network does not give is tried again, s. Then the
+    /// run ends, and the same command continues it.
+    pub retry_s: f64,
+    /// Number of damaged scans in a row that are skipped; one more ends the run. Over ten scans at
+    /// four per second a car drives farther than the search reaches.
+    pub max_unreadable: usize,
+}
+
+fn is_one(value: &NonZeroUsize) -> bool {
+    value.get() == 1
+}
+
+impl Default for SourceConfig {
+    fn default() -> Self {
+        Self {
+            kind: SourceKind::Recording,
+            address: String::new(),
+            topic: String::new(),
+            domain: None,
+            interface: String::new(),
+            silence_s: 3.0,
+            data: PathBuf::new(),
+            from: PlayedFrom::Scan,
+            first: 0,
+            scans: None,
+            repeat: false,
+            burst: NonZeroUsize::MIN,
+            faults: Vec::new(),
+            retry_s: 10.0,
+            max_unreadable: 10,
+        }
+    }
+}
+
+impl SourceConfig {
+    /// Returns the scans to play of a recording that has these, by their index in it.
+    pub fn played(&self, scans: Range<usize>) -> Range<usize> {
+        let first = self.first.max(scans.start).min(scans.end);
+        let end = first.saturating_add(self.scans.unwrap_or(usize::MAX));
+        first..end.min(scans.end)
+    }
+
+    /// Returns the scans of the stream that is played of a recording that has these, counted on
+    /// through all turns. It ends at `usize::MAX` if it is without end.
+    pub fn stream(&self, scans: Range<usize>) -> Range<usize> {
+        let once = self.played(scans);
+        match self.repeat && !once.is_empty() {
+            true => once.start..once.start.saturating_add(self.scans.unwrap_or(usize::MAX)),
+            false => once,
+        }
+    }
+
+    /// Returns the number of scans of [`stream`](Self::stream); `None`: without end.
+    pub fn stream_len(&self, scans: Range<usize>) -> Option<usize> {
+        let stream = self.stream(scans);
+        (stream.end < usize::MAX).then_some(stream.len())
+    }
+}
+
+crate::named! {
+    /// The first topic that is played from a recording: the stages that compute it, and all stages
+    /// before, are absent.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlayedFrom {
+        /// Scans: all stages compute.
+        #[default]
+        Scan = "scan",
+        /// Masked scans.
+        Masked = "masked",
+        /// Rotations, beside masked scans.
+        Rotation = "rotation",
+        /// Searched motions, beside masked scans.
+        Motion = "motion",
+        /// Refined motions.
+        Refined = "refined",
+    }
+}
+
+impl PlayedFrom {
+    /// Returns the topics that the stages after it read. `reads_masked`: the last stage reads
+    /// masked scans, for the keyframes of SLAM.
+    pub fn topics(self, refines: bool, reads_masked: bool) -> Vec<&'static str> {
+        match self {
+            Self::Scan => vec!["scan"],
+            Self::Masked => vec!["masked"],
+            Self::Rotation => vec!["masked", "rotation"],
+            Self::Motion if refines || reads_masked => vec!["masked", "motion"],
+            Self::Motion => vec!["motion"],
+            Self::Refined if reads_masked => vec!["masked", "refined"],
+            Self::Refined => vec!["refined"],
+        }
+    }
+}
+
+crate::named! {
+    /// The kind of a fault.
+    #[derive(
+        Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlayedFaultKind {
+        /// There are no samples of the gyro.
+        #[default]
+        GyroOut = "gyro-out",
+        /// The wheels turn 30 % faster than the vehicle drives.
+        WheelsSlip = "wheels-slip",
+        /// The stamps of the samples of gyro and wheels are 1 s ahead.
+        ClockJump = "clock-jump",
+        /// Scans show nothing.
+        RadarBlind = "radar-blind",
+    }
+}
+
+impl PlayedFaultKind {
+    /// Share of the excess turn of slipping wheels.
+    pub const SLIP_SHARE: f64 = 0.3;
+    /// Jump of the stamps of samples, s.
+    pub const JUMP_S: f64 = 1.0;
+}
+
+/// A fault to inject into the playback of a recording, at the same place of each turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlayedFault {
+    /// `gyro-out`: no samples of the gyro; `wheels-slip`: wheels that turn 30 % too fast;
+    /// `clock-jump`: stamps of the samples of gyro and wheels that are 1 s ahead; `radar-blind`:
+    /// scans that show nothing.
+    pub kind: PlayedFaultKind,
+    /// The begin, s after the stamp of the first scan that is played.
+    pub from_s: f64,
+    /// The duration, s; 0: no fault.
+    pub for_s: f64,
+}
+
+impl PlayedFault {
+    /// Returns whether it is there at a time after the stamp of the first scan, s.
+    pub fn is_at(&self, time_s: f64) -> bool {
+        (self.from_s..self.from_s + self.for_s).contains(&time_s)
+    }
+
+    /// Returns the time when its last effect ends, s after the stamp of the first scan: a clock
+    /// that jumps back repeats earlier stamps.
+    pub fn ends_s(&self) -> f64 {
+        let after_s = match self.kind {
+            PlayedFaultKind::ClockJump => PlayedFaultKind::JUMP_S,
+            _ => 0.0,
+        };
+        self.from_s + self.for_s + after_s
+    }
+
+    /// Returns the first key whose value is no time of at least 0.
+    pub fn invalid(&self) -> Option<(&'static str, f64)> {
+        let mut times = [("from_s", self.from_s), ("for_s", self.for_s)].into_iter();
+        times.find(|(_, time_s)| !(time_s.is_finite() && *time_s >= 0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_that_repeats_has_no_end_unless_its_scans_are_counted() {
+        let stream = |repeat, scans, once: Range<usize>| {
+            let source = SourceConfig {
+                repeat,
+                scans,
+                ..SourceConfig::default()
+            };
+            source.stream(once)
+        };
+        assert_eq!(stream(false, Some(100), 3..10), 3..10);
+        assert_eq!(stream(true, Some(100), 3..10), 3..103);
+        assert_eq!(stream(true, None, 3..10), 3..usize::MAX);
+        assert_eq!(stream(true, None, 3..3), 3..3);
+    }
+}

@@ -1,0 +1,20 @@
+//! Motion in the plane: poses, twists and covariances in SE(2), and the points of a scan.
+//! # Frames and units
+//! Frames follow REP-103: x forward, y left, yaw counter-clockwise. Lengths are in m, angles in
+//! rad, times in s. A motion is the pose of the later frame in the earlier frame. Composition is
+//! `first * then`.
+
+mod bounds;
+mod composed_motion;
+pub mod covariance;
+mod point;
+mod pose;
+pub mod samples;
+mod twist;
+
+pub use bounds::{Bounds, SettingError, check};
+pub use composed_motion::{ComposedMotion, OdometryMotion};
+pub use covariance::UncertainMotion;
+pub use point::SparsePoint;
+pub use pose::{Pose, interpolate, mirrored, pose, wrap_angle, xy_yaw};
+pub use twist::Twist;

@@ -1,0 +1,194 @@
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::samples::Sample;
+use crate::{
+    bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT},
+    check_bounds,
+};
+
+/// Least standard deviation of a scale: an axis leans by up to 8 degrees, in bends and on slopes.
+const LEANING: f64 = 0.01;
+
+/// Configuration of the gyro: section `[gyro]`.
+///
+/// The noise is as in a data sheet. The defaults suit a gyro of a car.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GyroConfig {
+    /// Whose yaw rate is used.
+    pub kind: GyroKind,
+    /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// The topic of the samples in ROS 2, of the type `sensor_msgs/msg/Imu`. Default: the only one
+    /// of a bag; `/imu/data` of a live radar.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// The address and port for receiving datagrams of a live gyro: lines of a stamp (ns since
+    /// 1970) and the rates about x, y and z (rad/s), with commas between.
+    pub listen: String,
+    /// Longest time for which a scan of a live radar waits for its samples, ms.
+    pub max_wait_ms: f64,
+    /// Delay of the stamps of the gyro against the radar's, s: it is subtracted from them.
+    pub delay_s: f64,
+    /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`. Default: the axis
+    /// where the log measures gravity, or the axis of its format; else `z`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub up: Option<UpAxis>,
+    /// True yaw rate over the measured one.
+    pub scale: f64,
+    /// Standard deviation of that scale.
+    pub scale_sigma: f64,
+    /// Bias at the start of a run, rad/s: it is subtracted from the measured rate.
+    pub bias_radps: f64,
+    /// Standard deviation of that bias, rad/s.
+    pub bias_sigma_radps: f64,
+    /// Angle random walk, rad/√s: one degree per square root of an hour is 2.9e-4.
+    pub noise_rad_per_sqrt_s: f64,
+    /// Random walk of the bias, rad/s/√s.
+    pub bias_walk_radps_per_sqrt_s: f64,
+    /// Standard deviation of the time of a sample against the radar's clock, s.
+    pub time_sigma_s: f64,
+    /// Longest time between two samples over which the rate is interpolated, s.
+    pub max_gap_s: f64,
+}
+
+/// Whose yaw rate, or speed of wheels, is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum GyroKind {
+    /// None: by the radar alone.
+    #[default]
+    None,
+    /// The log beside the scans, or the samples that come with them; without either it is an error.
+    Auto,
+    /// The log that `file` names.
+    Log,
+    /// Of a live radar: what arrives in datagrams at `listen`.
+    Udp,
+    /// Of a live radar behind its driver in ROS 2: `topic`.
+    Ros2,
+}
+
+/// The axis of a gyro that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum UpAxis {
+    /// x points up.
+    #[serde(rename = "x")]
+    X,
+    /// x points down.
+    #[serde(rename = "-x")]
+    MinusX,
+    /// y points up.
+    #[serde(rename = "y")]
+    Y,
+    /// y points down.
+    #[serde(rename = "-y")]
+    MinusY,
+    /// z points up.
+    #[default]
+    #[serde(rename = "z")]
+    Z,
+    /// z points down.
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+impl UpAxis {
+    /// Returns a vector along the axes of the gyro in right-handed axes whose third points up. The
+    /// axis that points ahead is unknown: z down implies x ahead and y right, z up implies x ahead
+    /// and y left; other axes are named in their order.
+    pub fn in_vehicle(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Z => [x, y, z],
+            Self::MinusZ => [x, -y, -z],
+            Self::X => [y, z, x],
+            Self::MinusX => [y, -z, -x],
+            Self::Y => [z, x, y],
+            Self::MinusY => [z, -x, -y],
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::MinusX => "-x",
+            Self::Y => "y",
+            Self::MinusY => "-y",
+            Self::Z => "z",
+            Self::MinusZ => "-z",
+        }
+    }
+}
+
+impl Default for GyroConfig {
+    fn default() -> Self {
+        Self {
+            kind: GyroKind::None,
+            file: None,
+            topic: None,
+            listen: "127.0.0.1:6321".to_owned(),
+            max_wait_ms: 20.0,
+            delay_s: 0.0,
+            up: None,
+            scale: 1.0,
+            scale_sigma: 0.01,
+            bias_radps: 0.0,
+            bias_sigma_radps: 0.01,
+            noise_rad_per_sqrt_s: 1e-4,
+            bias_walk_radps_per_sqrt_s: 5e-6,
+            time_sigma_s: 0.005,
+            max_gap_s: 0.12,
+        }
+    }
+}
+
+impl GyroConfig {
+    pub fn is_used(&self) -> bool {
+        self.kind != GyroKind::None
+    }
+
+    /// Returns whether the gyro is live: its samples arrive while the radar is received.
+    pub fn is_live(&self) -> bool {
+        matches!(self.kind, GyroKind::Udp | GyroKind::Ros2)
+    }
+
+    /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its
+    /// stamp, the scale is applied to the yaw rate alone, and the bias to nothing.
+    pub fn on_radar(&self, sample: &Sample) -> Sample {
+        let late_ns = (self.delay_s * 1e9).round() as i64;
+        let [x, y, z, along_x, along_y, along_z] = sample.values;
+        let up = self.up.unwrap_or_default();
+        let [roll, pitch, yaw] = up.in_vehicle([x, y, z]);
+        let [ahead, left, above] = up.in_vehicle([along_x, along_y, along_z]);
+        Sample {
+            stamp_ns: sample.stamp_ns.saturating_sub(late_ns),
+            values: [roll, pitch, yaw * self.scale, ahead, left, above],
+            ..*sample
+        }
+    }
+
+    /// Returns whether a gyro with these settings can have a learnt scale.
+    pub fn allows_scale(&self, scale: f64) -> bool {
+        (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
+    }
+
+    pub fn validate(&self) -> Result<(), SettingError> {
+        check_bounds! { self, "gyro":
+            delay_s in DELAY,
+            max_wait_ms in WAIT,
+            scale in SCALE,
+            scale_sigma in SHARE,
+            bias_radps in ([-1.0, 1.0], "a rate in rad/s, at most 1"),
+            bias_sigma_radps in ([0.0, 1.0], "a rate in rad/s, at most 1"),
+            noise_rad_per_sqrt_s in NOISE,
+            bias_walk_radps_per_sqrt_s in NOISE,
+            time_sigma_s in ([0.0, 1.0], "seconds, 0 to 1"),
+            max_gap_s in GAP,
+        }
+        Ok(())
+    }
+}

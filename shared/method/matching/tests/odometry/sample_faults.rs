@@ -1,0 +1,276 @@
+//! Faults in the samples of a gyro and of wheels: each leaves the motions unchanged, or a run
+//! counts and names it in its report about samples and motions. One kind of faults lasts for a
+//! sweep or more, the other for less: a third for one sample, a third for up to five.
+
+use std::collections::BTreeMap;
+
+use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
+use gyre_geometry::samples::{Gyro, GyroKind, Sample, SampleKind, Wheels, WheelsKind};
+use gyre_geometry::{Pose, SparsePoint, xy_yaw};
+use gyre_matching::Refiner;
+use gyre_matching::odometry::{Odometry, OdometryConfig};
+use gyre_radar::OwnedScan;
+use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
+
+/// A drive that was masked and searched once: what refinement gets, scan by scan.
+struct Drive {
+    dataset: Box<dyn Dataset>,
+    config: OdometryConfig,
+    scans: Vec<Scan>,
+    gyro: Vec<Sample>,
+    wheels: Vec<Sample>,
+    folder: tempfile::TempDir,
+}
+
+struct Scan {
+    stamp_ns: i64,
+    span_ns: [i64; 2],
+    points: Vec<SparsePoint>,
+    searched: Pose,
+}
+
+/// The motions, and the whole report of a run about its samples and motions.
+#[derive(Debug, PartialEq)]
+struct Ran {
+    motions: Vec<[u64; 3]>,
+    named: Vec<String>,
+}
+
+impl Drive {
+    fn new(scans: usize) -> Self {
+        let mut simulation = SimulationConfig {
+            scans: Some(scans),
+            ..SimulationConfig::default()
+        };
+        simulation.gyro.profile = GyroProfile::Asm330lhh;
+        simulation.wheels.rate_hz = 50.0;
+        let drive = SimulatedDrive::new(&simulation).unwrap();
+        let mut dataset =
+            open_source(Box::new(drive.renderer()), &simulation.dataset_options()).unwrap();
+        let mut config = OdometryConfig::default();
+        let mut odometry = Odometry::new(&config).unwrap();
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        let registered = |index| {
+            scan.geometry = dataset.read(index, scan.slot()).unwrap();
+            let view = scan.view();
+            let registered = odometry.register(&view, &[]).unwrap();
+            Scan {
+                stamp_ns: view.geometry.stamp_ns,
+                span_ns: view.span_ns(),
+                points: odometry.points().to_vec(),
+                searched: registered
+                    .searched
+                    .map_or(Pose::identity(), |it| it.motion.pose()),
+            }
+        };
+        let scans = (0..scans).map(registered).collect();
+        (config.gyro.kind, config.wheels.kind) = (GyroKind::Auto, WheelsKind::Auto);
+        Self {
+            scans,
+            dataset,
+            config,
+            gyro: drive.gyro_samples().unwrap(),
+            wheels: drive.wheel_samples().unwrap(),
+            folder: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    /// Reads both logs and refines all motions; rejected samples are named only by the message.
+    fn run(&self, gyro: &[Sample], wheels: &[Sample]) -> Ran {
+        match self.read(gyro, wheels) {
+            Ok(samples) => self.refine(&samples),
+            Err(refusal) => Ran {
+                motions: Vec::new(),
+                named: vec![refusal],
+            },
+        }
+    }
+
+    fn read(&self, gyro: &[Sample], wheels: &[Sample]) -> Result<ScanSamples, String> {
+        let write = |name: &str, header: &str, rows: &[Sample]| {
+            let rows = rows.iter().map(line);
+            let text: String = [header.to_owned()].into_iter().chain(rows).collect();
+            let path = self.folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let gyro = write(
+            "imu.csv",
+            "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps\n",
+            gyro,
+        );
+        let wheels = write("wheels.csv", "stamp_ns,speed_m_s\n", wheels);
+        let dataset = self.dataset.as_ref();
+        let turns = SampleLog::read_gyro(&gyro)
+            .and_then(|log| ScanSamples::of_gyro(&log, &self.config.gyro, dataset));
+        let speeds = SampleLog::read_wheels(&wheels, None)
+            .and_then(|log| ScanSamples::of_wheels(&log, &self.config.wheels, dataset));
+        let text = |error: gyre_datasets::LogError| error.to_string();
+        Ok(turns.map_err(text)?.and(speeds.map_err(text)?))
+    }
+
+    fn refine(&self, samples: &ScanSamples) -> Ran {
+        let config = &self.config;
+        let refiner = Refiner::new(&config.refinement, config.points.capacity).unwrap();
+        let mut refiner = refiner.with_sensors(&config.gyro, &config.wheels, &config.doppler);
+        let (mut gyro, mut wheels) = (Gyro::new(&config.gyro), Wheels::new(&config.wheels));
+        let mut counts: BTreeMap<String, u32> = BTreeMap::new();
+        let mut motions = Vec::new();
+        for (k, scan) in self.scans.iter().enumerate() {
+            let of = samples.of(self.dataset.as_ref(), scan.span_ns);
+            gyro.push(&of, scan.stamp_ns, scan.span_ns);
+            wheels.push(&of, scan.stamp_ns, scan.span_ns);
+            let Some(before) = k.checked_sub(1).map(|k| &self.scans[k]) else {
+                continue;
+            };
+            refiner.aiding.turn = gyro.turn();
+            refiner.aiding.distance = wheels.distance();
+            let interval_s = (scan.stamp_ns - before.stamp_ns) as f64 * 1e-9;
+            let (later, earlier) = (&scan.points, &before.points);
+            let refined = refiner.refine(k as u64, later, earlier, &scan.searched, interval_s);
+            motions.push(xy_yaw(&refined.motion.motion).map(f64::to_bits));
+            let turn = format!("turn {:?}", refined.gyro.map(|it| it.verdict));
+            let distance = format!("slip {:?}", refined.wheels.map(|it| it.slip));
+            for counted in [turn, distance, format!("{:?}", refined.outcome)] {
+                *counts.entry(counted).or_default() += 1;
+            }
+        }
+        let named = counts.iter().map(|(what, count)| format!("{what} {count}"));
+        Ran {
+            motions,
+            named: named.chain(samples.faults().iter().cloned()).collect(),
+        }
+    }
+}
+
+/// The number of values of a sample in a row of its log; the last one is the yaw rate or the speed.
+fn values(sample: &Sample) -> usize {
+    if sample.is(SampleKind::Gyro) { 3 } else { 1 }
+}
+
+fn line(sample: &Sample) -> String {
+    let values = sample.values[..values(sample)].iter();
+    let values: String = values.map(|value| format!(",{value}")).collect();
+    format!("{}{values}\n", sample.stamp_ns)
+}
+
+fn last(sample: &mut Sample) -> &mut f64 {
+    let count = values(sample);
+    &mut sample.values[count - 1]
+}
+
+/// SplitMix64 (Steele et al. 2014).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        bits ^ (bits >> 31)
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+}
+
+const KINDS: [&str; 7] = [
+    "lost",
+    "late",
+    "repeated",
+    "out of order",
+    "nan",
+    "jump",
+    "unit",
+];
+
+const SWEEP: [usize; 2] = [26, 13];
+
+/// Draws a number of samples of a gyro (0) or of wheels (1): those of a sweep or more, or less.
+fn length(is_long: bool, sensor: usize, seed: u64, numbers: &mut Numbers) -> usize {
+    let sweep = SWEEP[sensor];
+    match (is_long, seed / 14 % 3) {
+        (true, _) => sweep + numbers.below(94 / (1 + sensor)),
+        (false, 0) => 1,
+        (false, 1) => 1 + numbers.below(5),
+        (false, _) => 1 + numbers.below(sweep - 1),
+    }
+}
+
+/// Puts a fault of a kind into so many rows of a log, which is of a gyro or of wheels.
+fn spoil(rows: &mut Vec<Sample>, kind: &str, is_gyro: bool, count: usize, numbers: &mut Numbers) {
+    let from = numbers.below(rows.len() - count);
+    let stretch = from..from + count;
+    match kind {
+        "lost" => drop(rows.drain(stretch)),
+        "late" => {
+            let late_ns = 1_000_000 * (50 + numbers.below(2000) as i64);
+            rows[stretch]
+                .iter_mut()
+                .for_each(|row| row.stamp_ns += late_ns);
+        }
+        "repeated" => {
+            let again = rows[stretch.clone()].to_vec();
+            rows.splice(stretch.end..stretch.end, again);
+        }
+        "out of order" => rows[stretch].reverse(),
+        "nan" => rows[stretch]
+            .iter_mut()
+            .for_each(|row| *last(row) = f64::NAN),
+        "jump" => {
+            let (least, wide) = if is_gyro { (0.5, 80) } else { (3.0, 500) };
+            let by = least + 0.1 * numbers.below(wide) as f64;
+            let by = if numbers.below(2) == 0 { by } else { -by };
+            rows[stretch].iter_mut().for_each(|row| *last(row) += by);
+        }
+        _ => {
+            let factor = if is_gyro { 57.295_779_5 } else { 3.6 };
+            rows.iter_mut().for_each(|row| {
+                row.values.iter_mut().for_each(|value| *value *= factor);
+            });
+        }
+    }
+}
+
+/// Draws so many faults, and checks that each that changes a motion is named.
+fn faults(drive: &Drive, count: u64, is_long: bool) {
+    let logs = [drive.gyro.clone(), drive.wheels.clone()];
+    let good = drive.run(&logs[0], &logs[1]);
+    assert_eq!(good.motions.len(), drive.scans.len() - 1, "{good:?}");
+    for seed in 0..count {
+        let mut numbers = Numbers(seed);
+        let kind = KINDS[(seed as usize) % KINDS.len()];
+        let sensor = seed as usize / KINDS.len() % 2;
+        let mut spoilt = logs.clone();
+        let samples = length(is_long, sensor, seed, &mut numbers);
+        spoil(
+            &mut spoilt[sensor],
+            kind,
+            sensor == 0,
+            samples,
+            &mut numbers,
+        );
+        let ran = drive.run(&spoilt[0], &spoilt[1]);
+        assert!(
+            ran.motions == good.motions || ran.named != good.named,
+            "seed {seed}, {kind}, {samples} samples of sensor {sensor}: silent"
+        );
+    }
+}
+
+#[test]
+fn no_fault_of_samples_changes_a_motion_silently() {
+    let drive = Drive::new(16);
+    faults(&drive, 28, true);
+    faults(&drive, 42, false);
+}
+
+#[test]
+#[ignore = ".ci/nightly: 616 faults, each with the refinement of 40 scans"]
+fn no_fault_of_many_changes_a_motion_silently() {
+    let drive = Drive::new(40);
+    faults(&drive, 308, true);
+    faults(&drive, 308, false);
+}

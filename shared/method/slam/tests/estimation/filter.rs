@@ -1,0 +1,131 @@
+//! The trajectory filter on cases worked by hand, and on cases of groups and limits.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::common::{Drive, ODOMETRY, exact};
+use gyre_geometry::{Pose, UncertainMotion, pose, xy_yaw};
+use gyre_slam::estimation::{Constraint, EstimationError, Kind, Outcome, TrajectoryFilter};
+use nalgebra::{Matrix3, Vector3};
+
+/// A motion along x with variance `x` in m^2, and next to no error otherwise.
+fn along(x_m: f64, x: f64) -> UncertainMotion {
+    UncertainMotion {
+        motion: pose(x_m, 0.0, 0.0),
+        covariance: Matrix3::from_diagonal(&Vector3::new(x, 1e-9, 1e-12)),
+    }
+}
+
+fn straight(motions: usize) -> TrajectoryFilter {
+    let mut filter = TrajectoryFilter::new(Pose::identity(), TrajectoryFilter::MAX_KEYFRAMES);
+    for k in 0..motions {
+        filter
+            .apply(&Constraint::odometry(k, along(1.0, 1.0)))
+            .unwrap();
+    }
+    filter
+}
+
+#[test]
+fn a_loop_is_shared_among_the_poses_before_it_by_their_covariance() {
+    let mut filter = straight(2);
+    let before = filter.pose(2).unwrap();
+    assert!((before.covariance[(0, 0)] - 2.0).abs() < 1e-6);
+
+    // Predicted 2 m with variance 2, measured 2.4 m with variance 2: the gain is one half, and one
+    // quarter for the pose half-way.
+    let verdict = filter
+        .apply(&Constraint::closing(0, 2, along(2.4, 2.0)))
+        .unwrap();
+    assert_eq!(verdict.outcome, Outcome::Accepted);
+    assert!((verdict.chi_square - 0.4 * 0.4 / 4.0).abs() < 1e-6);
+    for (keyframe, x_m, variance) in [(0, 0.0, 0.0), (1, 1.1, 0.75), (2, 2.2, 1.0)] {
+        let found = filter.pose(keyframe).unwrap();
+        assert!((found.motion.translation.x - x_m).abs() < 1e-6, "{found:?}");
+        assert!((found.covariance[(0, 0)] - variance).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn an_uncertain_turn_makes_a_later_pose_uncertain_sideways() {
+    let mut filter = TrajectoryFilter::new(Pose::identity(), TrajectoryFilter::MAX_KEYFRAMES);
+    let turn = UncertainMotion {
+        motion: pose(0.0, 0.0, FRAC_PI_2),
+        covariance: Matrix3::from_diagonal(&Vector3::new(1e-12, 1e-12, 1e-4)),
+    };
+    filter.apply(&Constraint::odometry(0, turn)).unwrap();
+    filter
+        .apply(&Constraint::odometry(1, along(10.0, 4.0)))
+        .unwrap();
+    let end = filter.pose(2).unwrap();
+    assert!((end.motion.translation.vector - Vector3::new(0.0, 10.0, 0.0).xy()).norm() < 1e-12);
+    // 10 m to the left at 0.01 rad: 0.1 m along x. The second motion's x is now y.
+    let expected = Matrix3::new(0.01, 0.0, -1e-3, 0.0, 4.0, 0.0, -1e-3, 0.0, 1e-4);
+    assert!(
+        (end.covariance - expected).norm() < 1e-6,
+        "{}",
+        end.covariance
+    );
+}
+
+#[test]
+fn a_loop_that_contradicts_the_estimate_changes_nothing() {
+    let mut filter = straight(2);
+    let poses = filter.poses().to_vec();
+    // 12 m from the prediction, whose standard deviation is 1.4 m, with one of the measurement of
+    // 1.4 m: 36.
+    let wrong = Constraint::closing(0, 2, along(14.0, 2.0));
+    let verdict = filter.apply(&wrong).unwrap();
+    assert_eq!(verdict.outcome, Outcome::Rejected);
+    assert!((verdict.chi_square - 36.0).abs() < 1e-3);
+    assert_eq!(filter.poses(), poses);
+    assert!((filter.pose(2).unwrap().covariance[(0, 0)] - 2.0).abs() < 1e-6);
+}
+
+#[test]
+fn of_a_group_with_common_errors_only_the_first_loop_counts() {
+    let member = |from| Constraint {
+        kind: Kind::Loop { group: Some(7) },
+        ..Constraint::closing(from, 0, along(-(from as f64) - 0.1, 0.01))
+    };
+    let mut filter = straight(4);
+    assert_eq!(filter.apply(&member(4)).unwrap().outcome, Outcome::Accepted);
+    let poses = filter.poses().to_vec();
+    assert_eq!(
+        filter.apply(&member(3)).unwrap().outcome,
+        Outcome::Redundant
+    );
+    assert_eq!(filter.poses(), poses);
+}
+
+#[test]
+fn the_covariance_stays_symmetric_and_positive_through_many_loops() {
+    let mut drive = Drive::new(200, 25, ODOMETRY, 4);
+    let mut filter = drive.filter();
+    for from in 30..200 {
+        let closing = drive.close(from, from - 25);
+        filter.apply(&closing).unwrap();
+    }
+    for k in 1..200 {
+        let covariance = filter.pose(k).unwrap().covariance;
+        assert!(covariance.cholesky().is_some(), "{k}: {covariance}");
+        assert!((covariance - covariance.transpose()).norm() == 0.0);
+    }
+}
+
+#[test]
+fn a_full_filter_refuses_the_next_keyframe_and_says_what_to_do() {
+    let mut filter = TrajectoryFilter::new(Pose::identity(), 3);
+    for k in 0..2 {
+        filter
+            .apply(&Constraint::odometry(k, along(1.0, 1.0)))
+            .unwrap();
+    }
+    let refused = filter.apply(&Constraint::odometry(2, along(1.0, 1.0)));
+    assert_eq!(refused, Err(EstimationError::TooManyKeyframes { limit: 3 }));
+    assert_eq!(filter.poses().len(), 3);
+    assert!(filter.pose(3).is_err());
+    // Loops among the keyframes that it has are still taken.
+    let closing = Constraint::closing(0, 2, exact(pose(2.1, 0.0, 0.0), [0.1; 3]));
+    assert_eq!(filter.apply(&closing).unwrap().outcome, Outcome::Accepted);
+    assert!(xy_yaw(&filter.poses()[2])[0] > 2.0);
+}
