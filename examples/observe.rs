@@ -14,8 +14,8 @@
 
 use std::{error::Error, path::PathBuf, time::Duration};
 
+use gyre_client::observer::{Next, ObservedRun};
 use gyre_contract::{Pose, Scan};
-use gyre_stage::observer::{Next, ObservedRun};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let out: PathBuf = std::env::args_os()

@@ -10,10 +10,10 @@
 
 use std::error::Error;
 
-use gyre_matching::odometry::{
-    Odometry, OdometryConfig, OdometryError, Pair, Parts, Registered, Search,
+use gyre_matching::{
+    JointMatch, RotationMatch, TranslationSearch,
+    odometry::{Odometry, OdometryConfig, OdometryError, Pair, Parts, Registered, Search},
 };
-use gyre_matching::{JointMatch, RotationMatch, TranslationSearch};
 use gyre_simulator::{SimulationConfig, Simulator};
 
 /// Time between two readings.

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_stage::run::{SHARED_MEMORY, root_of};
+use gyre_transport::run::{SHARED_MEMORY, root_of};
 
 use super::processes;
 

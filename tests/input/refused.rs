@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path};
 
-use gyre_stage::run::SHARED_MEMORY;
+use gyre_transport::run::SHARED_MEMORY;
 
 use crate::{
     common::{Ended, Run, STAGES, odometry, recording},

@@ -8,8 +8,10 @@ use gyre_journal as journal;
 use gyre_matching::odometry::{Odometry, OdometryConfig, Outcome, Registered};
 use gyre_radar::OwnedScan;
 
-use crate::common::{Run, real_data, runtime_is_installed};
-use crate::method::{learned_masks::card, refinement::names};
+use crate::{
+    common::{Run, real_data, runtime_is_installed},
+    method::{learned_masks::card, refinement::names},
+};
 
 fn register_all(run: &Run) -> Vec<Registered> {
     let resolved = run.out().join("config.toml");

@@ -9,9 +9,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::{Usage, control::Control, memory};
 use gyre_simulator::{GyroProfile, Profile, SimulationConfig};
-use gyre_stage::control::Control;
-use gyre_supervise::{Usage, memory};
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;

@@ -13,8 +13,7 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
-use gyre_contract::run::Ending;
-use gyre_contract::{Hop, Item, MotionEstimate, PoseHeader, flag};
+use gyre_contract::{Hop, Item, MotionEstimate, PoseHeader, flag, run::Ending};
 use gyre_journal::{self as journal, Journal};
 use gyre_results::{Out, Session};
 use tempfile::TempDir;

@@ -8,7 +8,7 @@ use std::{
     process::Command,
 };
 
-use gyre_stage::run::SHARED_MEMORY;
+use gyre_transport::run::SHARED_MEMORY;
 use tempfile::TempDir;
 
 use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed};

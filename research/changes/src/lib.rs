@@ -20,15 +20,12 @@
 mod clusters;
 mod survey;
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
-
-use gyre_slam::mapping::{TILE_CELLS, TileIndex};
-use gyre_masking::networks::{PlanesError, PlanesNetwork};
-use gyre_slam::localisation::PlacedDrive;
-use serde::Serialize;
+use std::{collections::{BTreeMap, BTreeSet}, fmt};
 
 use clusters::Cluster;
+use gyre_masking::networks::{PlanesError, PlanesNetwork};
+use gyre_slam::{mapping::{TILE_CELLS, TileIndex}, localisation::PlacedDrive};
+use serde::Serialize;
 pub use survey::Survey;
 use survey::{CELL_M, PLANES};
 

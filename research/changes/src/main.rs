@@ -1,22 +1,14 @@
 //! `gyre-changes EARLIER LATER`: what has appeared and gone between two drives through one place.
 
-use std::{
-    fs,
-    io::Write,
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::{fs, io::Write, path::{Path, PathBuf}, process::ExitCode};
 
 use clap::Parser;
 use gyre_changes::{Change, ChangeKind, Changes, Survey, changes, near_fixes};
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, terminal::{Failure, print}};
 use gyre_datasets::ground_truth::read_trajectory;
-use gyre_slam::localisation::{Localiser, PlacedDrive};
-use gyre_slam::{Keyframe, RecordReader, records_path};
+use gyre_slam::{localisation::{Localiser, PlacedDrive}, Keyframe, RecordReader, records_path};
 use gyre_storage::{self as storage, StorageError};
-use gyre_configuration::terminal::{Failure, print};
-use gyre_tools::maps::localise::searched_map;
-use gyre_tools::maps::map::{self, keyframes, placing};
+use gyre_tools::maps::{localise::searched_map, map::{self, keyframes, placing}};
 use serde::Serialize;
 
 /// The table of all changes.

@@ -1,11 +1,9 @@
 //! The looks of one drive at each place, and what they saw there.
 
-use std::collections::BTreeMap;
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::{collections::BTreeMap, f64::consts::FRAC_1_SQRT_2};
 
 use gyre_geometry::Pose;
-use gyre_slam::mapping::{MapOptions, TILE_CELLS, TileIndex, View};
-use gyre_slam::Keyframe;
+use gyre_slam::{mapping::{MapOptions, TILE_CELLS, TileIndex, View}, Keyframe};
 use nalgebra::Point2;
 
 /// Side of a cell, m: a car is nine long and four wide.

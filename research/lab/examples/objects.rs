@@ -10,22 +10,16 @@
 //! traffic, with `-road` all that makes a simulated road hard) and a number of scans through a
 //! random town. Drives together are evaluated as one, and each by itself.
 
-use std::collections::BTreeMap;
-use std::error::Error;
-use std::f64::consts::TAU;
-use std::path::Path;
-use std::{env, fs};
+use std::{collections::BTreeMap, error::Error, f64::consts::TAU, path::Path, env, fs};
 
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
-use gyre_results::evaluation::{ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
 use gyre_masking::networks::runtime;
-use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
+use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use gyre_radar::OwnedScan;
-use gyre_worlds::drive::DriveKind;
-use gyre_worlds::weather::WeatherConfig;
-use gyre_worlds::{Realism, SimulatedDrive, SimulationConfig};
+use gyre_results::evaluation::{ObjectScan, TrackedObject, TrueObject, object_errors};
+use gyre_worlds::{drive::DriveKind, weather::WeatherConfig, Realism, SimulatedDrive, SimulationConfig};
 use nalgebra::{Point2, Vector2};
 use serde::Deserialize;
 

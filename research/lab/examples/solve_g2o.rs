@@ -6,9 +6,7 @@
 //! structure. `--out` writes the solutions as files of the same names. `compare_gtsam.py` beside
 //! this file compares with GTSAM.
 
-use std::error::Error;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::{error::Error, path::{Path, PathBuf}, time::Instant};
 
 use gyre_slam::estimation::{G2o, GraphOptions, Kernel, PoseGraph};
 

@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_datasets::{find_ground_truth, read_trajectory};
-use gyre_slam::estimation::places::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 use gyre_geometry::Pose;
-use gyre_radar::Trajectory;
 use gyre_matching::{RefinementConfig, Submap};
-use gyre_slam::{Keyframe, RecordReader};
-use gyre_configuration::terminal::Failure;
+use gyre_radar::Trajectory;
+use gyre_slam::{estimation::places::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours}, Keyframe, RecordReader};
 
 /// Poses of a run and of the truth belong to a scan if they are this near in time.
 const SAME_TIME_NS: u64 = 50_000_000;

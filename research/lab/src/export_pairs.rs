@@ -27,19 +27,14 @@ mod provenance;
 
 use std::{fs, path::PathBuf, process::ExitCode, time::Instant};
 
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, terminal::{Failure, print}};
 use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
-use gyre_configuration::terminal::{Failure, print};
-
-use crate::{
-    cli::ExportPairsArguments,
-    recording::{Recording, Track},
-    report::save,
-};
 use npy::NpyWriter;
 use preparation::Preparation;
 use provenance::Sequence;
+
+use crate::{cli::ExportPairsArguments, recording::{Recording, Track}, report::save};
 
 /// Writes the records of all recordings, and what they were made of.
 ///

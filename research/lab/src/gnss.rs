@@ -5,13 +5,10 @@ mod lever;
 use std::{ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::{Configuration, gnss_log};
-use gyre_slam::estimation::{Position, align};
-use gyre_geometry::Pose;
+use gyre_configuration::{Configuration, gnss_log, terminal::Failure};
+use gyre_geometry::{Pose, samples::{GnssConfig, GnssFix}};
 use gyre_radar::median;
-use gyre_geometry::samples::{GnssConfig, GnssFix};
-use gyre_slam::{EstimatorKind, Fixes, Keyframe, Query, RecordReader, TrajectoryEstimator};
-use gyre_configuration::terminal::Failure;
+use gyre_slam::{estimation::{Position, align}, EstimatorKind, Fixes, Keyframe, Query, RecordReader, TrajectoryEstimator};
 use nalgebra::{Point2, Vector2};
 use serde_json::{Value, json};
 

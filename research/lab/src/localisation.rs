@@ -6,18 +6,14 @@ mod figures;
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::Configuration;
+use figures::{First, FixError, Tracking};
+use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_slam::localisation::{Fix, Localiser, Status};
-use gyre_configuration::terminal::Failure;
 use gyre_tools::maps::localise::{Scans, searched_map};
 use rustix::time::{ClockId, clock_gettime};
 
-use crate::{
-    recording::Track,
-    report::{make_folder, publish},
-};
-use figures::{First, FixError, Tracking};
+use crate::{recording::Track, report::{make_folder, publish}};
 
 /// A scan is on the map within this distance from a keyframe, m, and outside beyond the other.
 const ON_MAP_M: f64 = 5.0;

@@ -1,19 +1,12 @@
 //! A recording as a configuration plays it, and the truth about its path.
 
-use std::{
-    ops::Range,
-    path::{Path, PathBuf},
-};
+use std::{ops::Range, path::{Path, PathBuf}};
 
-use gyre_configuration::{Configuration, Played};
-use gyre_datasets::{
-    Dataset,
-    ground_truth::{find_ground_truth, parse_trajectory, read_trajectory},
-};
+use gyre_configuration::{Configuration, Played, terminal::{Failure, print}};
+use gyre_datasets::{Dataset, ground_truth::{find_ground_truth, parse_trajectory, read_trajectory}};
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, Trajectory};
 use gyre_results::SIMULATED_TRUTH;
-use gyre_configuration::terminal::{Failure, print};
 
 /// A trajectory is not interpolated across wider gaps, as in `gyre evaluate`, but for those that
 /// all its steps are.

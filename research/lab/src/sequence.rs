@@ -1,23 +1,13 @@
 //! A recording with its configuration, and `gyre run` on it.
 
-use std::{
-    collections::BTreeSet,
-    env, fs,
-    path::{Path, PathBuf},
-    process::{Command, Stdio},
-};
+use std::{collections::BTreeSet, env, fs, path::{Path, PathBuf}, process::{Command, Stdio}};
 
 use clap::Args;
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, terminal::{Failure, print}};
 use gyre_contract::StageId;
-use gyre_configuration::terminal::{Failure, print};
 use serde_json::{Value, json};
 
-use crate::{
-    models::Model,
-    recording::{Recording, folder_name},
-    report::{Column, Notes, Record, Table, command, record},
-};
+use crate::{models::Model, recording::{Recording, folder_name}, report::{Column, Notes, Record, Table, command, record}};
 
 /// The sequences of a command line.
 #[derive(Debug, Args)]

@@ -7,15 +7,11 @@ mod wrong;
 use std::{convert::Infallible, path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
-use gyre_slam::estimation::Constraint;
-use gyre_slam::{EstimatorKind, LoopCloser, Query, SUBMAP_REACH_M, TrajectoryEstimator};
-use gyre_configuration::terminal::Failure;
-
-use crate::{
-    drive::Drive,
-    report::{make_folder, publish},
-};
 use figures::{Figures, loops_table};
+use gyre_configuration::terminal::Failure;
+use gyre_slam::{estimation::Constraint, EstimatorKind, LoopCloser, Query, SUBMAP_REACH_M, TrajectoryEstimator};
+
+use crate::{drive::Drive, report::{make_folder, publish}};
 
 #[derive(Debug, Args)]
 pub struct SlamArguments {

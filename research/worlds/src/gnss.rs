@@ -1,7 +1,6 @@
 //! A GNSS receiver: the section `[simulation.gnss]`, and the log that it leaves.
 
-use std::f64::consts::TAU;
-use std::fmt::Write as _;
+use std::{f64::consts::TAU, fmt::Write as _};
 
 use gyre_geometry::samples::{Geographic, LocalPlane, RawFix};
 use nalgebra::{Point2, Vector2};
@@ -10,9 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::episodes::Episodes;
-use crate::stream::Stream;
-use crate::{TunnelConfig, error::SimulatorError, limits::require_within, path::Path};
+use crate::{episodes::Episodes, stream::Stream, TunnelConfig, error::SimulatorError, limits::require_within, path::Path};
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "gnss.csv";

@@ -4,23 +4,10 @@
 use std::path::PathBuf;
 
 use gyre_datasets::{DatasetOptions, Format, ImageSize, ImageSource};
-use gyre_radar::{OwnedScan, ScanSlot};
 use gyre_geometry::samples::Sample;
+use gyre_radar::{OwnedScan, ScanSlot};
 
-use crate::config::SimulationConfig;
-use crate::error::SimulatorError;
-use crate::gyro::log;
-use crate::layout::side_file::SideFile;
-use crate::layout::{boreas, oxford, radiate};
-use crate::objects;
-use crate::output::{HostStamps, OutputFormat};
-use crate::profile::Chirp;
-use crate::profile::METADATA_BYTES;
-use crate::sensor::Sensor;
-use crate::sensor::effects::is_on;
-use crate::simulator::Simulator;
-use crate::truth;
-use crate::{gnss, wheels};
+use crate::{config::SimulationConfig, error::SimulatorError, gyro::log, layout::{side_file::SideFile, boreas, oxford, radiate}, objects, output::{HostStamps, OutputFormat}, profile::{Chirp, METADATA_BYTES}, sensor::{Sensor, effects::is_on}, simulator::Simulator, truth, gnss, wheels};
 
 /// A simulated drive in a dataset format.
 #[derive(Clone)]

@@ -1,29 +1,12 @@
 //! Rendering of single scans in memory, without files.
 
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, samples::{RawFix, Sample}};
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
-use gyre_geometry::samples::{RawFix, Sample};
 use nalgebra::Point2;
 
-use crate::config::{MAX_SCANS, SimulationConfig};
-use crate::error::SimulatorError;
-use crate::gyro::{Vehicle, log};
-use crate::path::Path;
-use crate::path::recorded::{self, Excerpt};
-use crate::profile::Sampling;
-use crate::relief::Relief;
-use crate::sensor::effects::is_on;
-use crate::sensor::{PitchRoll, Scene, Sensor, SweepTime};
-use crate::streets::Streets;
-use crate::town::{ParkedCar, Town};
-use crate::traffic::{Observer, RoadUser, Traffic};
-use crate::tunnel;
-use crate::weather::WeatherConfig;
-use crate::world::World;
-use crate::{gnss, wheels};
+use crate::{config::{MAX_SCANS, SimulationConfig}, error::SimulatorError, gyro::{Vehicle, log}, path::{Path, recorded::{self, Excerpt}}, profile::Sampling, relief::Relief, sensor::{effects::is_on, PitchRoll, Scene, Sensor, SweepTime}, streets::Streets, town::{ParkedCar, Town}, traffic::{Observer, RoadUser, Traffic}, tunnel, weather::WeatherConfig, world::World, gnss, wheels};
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
 /// Readers check that the year is plausible, and it is fixed so that a configuration always gives

@@ -2,16 +2,14 @@
 
 use std::fmt::Write as _;
 
-use gyre_geometry::{Pose, Twist};
-use gyre_geometry::samples::Sample;
+use gyre_geometry::{Pose, Twist, samples::Sample};
 use nalgebra::Translation2;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{episodes::Episodes, error::SimulatorError, limits::require_within};
-use crate::{path::Path, stream::Stream};
+use crate::{episodes::Episodes, error::SimulatorError, limits::require_within, path::Path, stream::Stream};
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "wheels.csv";

@@ -11,11 +11,13 @@ use std::{
 };
 
 use clap::Args;
-use gyre_configuration::paths::shipped;
-use gyre_configuration::terminal::{Failure, INTERRUPTED, print};
+use gyre_configuration::{
+    paths::shipped,
+    terminal::{Failure, INTERRUPTED, print},
+};
 use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
-use gyre_stage::run::end_with;
 use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
+use gyre_transport::run::end_with;
 use rustix::process::Signal;
 
 use crate::{

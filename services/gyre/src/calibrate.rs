@@ -12,14 +12,16 @@ use std::{
 
 use clap::Args;
 use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
-use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
-use gyre_configuration::{Configuration, Played, describe_masks_in_process, with_stored_options};
+use gyre_configuration::{
+    Configuration, Played, describe_masks_in_process,
+    terminal::{Failure, inputs::Inputs, print},
+    with_stored_options,
+};
 use gyre_geometry::samples::{GyroKind, WheelsKind};
 use gyre_radar::{OwnedScan, SweepGeometry};
 use gyre_results::{Content, Out};
 use gyre_storage as storage;
 use gyre_tools::bar::Bar;
-
 use sensors::{Gyro, Wheels};
 
 #[derive(Debug, Args)]

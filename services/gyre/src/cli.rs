@@ -7,16 +7,18 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 use gyre_configuration::terminal::inputs::ConfigArguments;
 use gyre_results::evaluate::EvaluateArguments;
-use gyre_tools::export::ExportArguments;
-use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
-use gyre_tools::masks::MasksArguments;
-use gyre_tools::new::New;
-use gyre_tools::operate::{
-    EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
-    TopArguments,
+use gyre_tools::{
+    export::ExportArguments,
+    maps::{localise::LocaliseArguments, map::MapArguments},
+    masks::MasksArguments,
+    new::New,
+    operate::{
+        EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
+        TopArguments,
+    },
+    radar_server::RadarServerArguments,
+    report::ReportArguments,
 };
-use gyre_tools::radar_server::RadarServerArguments;
-use gyre_tools::report::ReportArguments;
 
 use crate::{
     arguments::{LinkEnd, Ros2Arguments, RunArguments, RunOptions},

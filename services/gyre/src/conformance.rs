@@ -3,15 +3,15 @@
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::{Args, builder::PossibleValuesParser};
-use gyre_configuration::terminal::inputs::Inputs;
-use gyre_configuration::terminal::{Failure, INTERRUPTED, own, print, seconds, words};
-use gyre_configuration::{Configuration, describe_masks, with_stored_options};
-use gyre_contract::StageId;
-use gyre_contract::run::Scheduling;
-use gyre_matching::RefinementKind;
-use gyre_matching::odometry::SearchKind;
-use gyre_stage::{StageError, wake::Signals};
+use gyre_configuration::{
+    Configuration, describe_masks,
+    terminal::{Failure, INTERRUPTED, inputs::Inputs, own, print, seconds, words},
+    with_stored_options,
+};
+use gyre_contract::{StageId, run::Scheduling};
+use gyre_matching::{RefinementKind, odometry::SearchKind};
 use gyre_tools::conformance::{Candidate, Demands, Report, Test, check};
+use gyre_transport::{RunError, wake::Signals};
 
 use crate::{arguments::RunArguments, preflight, program, run::resolve};
 
@@ -121,7 +121,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         }
     };
     match check(&test, &signals, &mut observe) {
-        Err(error) if matches!(error.downcast_ref(), Some(StageError::Stopped)) => Ok(None),
+        Err(error) if matches!(error.downcast_ref(), Some(RunError::Stopped)) => Ok(None),
         report => report.map(Some),
     }
 }

@@ -8,10 +8,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
-use gyre_contract::StageId;
-use gyre_contract::run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
+use gyre_contract::{
+    StageId,
+    run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side},
+};
 use gyre_journal::{
     self as journal, Content, JournalError,
     checkpoint::{self, Checkpoint},
@@ -23,8 +27,8 @@ use gyre_matching::Refiner;
 use gyre_recording::received_fixes;
 use gyre_results::{FILES, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
-use gyre_stage::Generation;
 use gyre_storage::{self as storage, GroupSync, LogError};
+use gyre_transport::Generation;
 use gyre_watch::recorder::Ledger;
 
 pub use replaced::{is_untouched, settle};

@@ -3,8 +3,11 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::terminal::inputs::{Inputs, configuration};
-use gyre_configuration::terminal::{Failure, print};
+use gyre_configuration::terminal::{
+    Failure,
+    inputs::{Inputs, configuration},
+    print,
+};
 use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
 
 #[derive(Debug, Args)]

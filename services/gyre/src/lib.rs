@@ -32,22 +32,23 @@ pub mod watch;
 
 use std::{path::PathBuf, process::ExitCode};
 
-use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
-use gyre_configuration::{Configuration, schema};
-
 use arguments::RunArguments;
 use cli::Command;
+use gyre_configuration::{
+    Configuration, schema,
+    terminal::{Failure, inputs::Inputs, print},
+};
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
-    gyre_stage::wake::report_file_size_limit()?;
+    gyre_transport::wake::report_file_size_limit()?;
     if is_private(&command) {
-        gyre_stage::run::keep_files_private();
+        gyre_transport::run::keep_files_private();
     }
     match command {
         Command::New { what } => gyre_tools::new::new(&what),
         Command::Stage { name, python } => Ok(stage::run(&name, python)),
         Command::Guard => {
-            let root = std::env::var_os(gyre_stage::run::ENVIRONMENT).map(PathBuf::from);
+            let root = std::env::var_os(gyre_transport::run::ENVIRONMENT).map(PathBuf::from);
             gyre_supervise::guard(std::io::stdin().lock(), root.as_deref());
             Ok(ExitCode::SUCCESS)
         }

@@ -3,10 +3,9 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use gyre_configuration::terminal::{Failure, INTERRUPTED, own, print};
-use gyre_contract::Footprint;
-use gyre_contract::run::LinkConfig;
+use gyre_contract::{Footprint, run::LinkConfig};
 use gyre_results::Out;
-use gyre_stage::{run::sweep, wake::Signals};
+use gyre_transport::{run::sweep, wake::Signals};
 
 use crate::{
     arguments::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},

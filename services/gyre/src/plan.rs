@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::Failure;
-use gyre_contract::run::{LinkConfig, Mode, RecordConfig, Side, StageConfig};
-use gyre_contract::{FollowerId, StageId};
+use gyre_configuration::{Configuration, terminal::Failure};
+use gyre_contract::{
+    FollowerId, StageId,
+    run::{LinkConfig, Mode, RecordConfig, Side, StageConfig},
+};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 
 pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan> {

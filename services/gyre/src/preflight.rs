@@ -6,17 +6,23 @@ use std::{
     time::Duration,
 };
 
-use gyre_configuration::terminal::{Failure, print};
-use gyre_configuration::{Configuration, Played, gnss_log, open};
-use gyre_contract::run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind};
-use gyre_contract::{Footprint, Limits, StageId, Window};
+use gyre_configuration::{
+    Configuration, Played, gnss_log, open,
+    terminal::{Failure, print},
+};
+use gyre_contract::{
+    Footprint, Limits, StageId, Window,
+    run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind},
+};
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
 use gyre_geometry::samples::{GyroKind, MAX_SAMPLES};
 use gyre_masking::Masker;
-use gyre_stage::{Manifest, run::free_shared_memory};
-use gyre_stages::live_radar::{Settings, Sizes};
-use gyre_stages::radar_replay::{Listing, Player};
+use gyre_stages::{
+    live_radar::{Settings, Sizes},
+    radar_replay::{Listing, Player},
+};
 use gyre_tools::maps::localise::searched_map;
+use gyre_transport::{Manifest, run::free_shared_memory};
 use rustix::process::{Resource, getrlimit};
 
 use crate::split;

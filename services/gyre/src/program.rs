@@ -7,8 +7,7 @@
 use std::{collections::BTreeMap, io, path::Path};
 
 use blake3::Hasher;
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::own;
+use gyre_configuration::{Configuration, terminal::own};
 use gyre_contract::run::StageConfig;
 use gyre_results::Programs;
 use gyre_supervise::StagePlan;

@@ -5,9 +5,9 @@ mod silence;
 use std::{fmt::Display, time::Instant};
 
 use gyre_contract::{Item, PoseHeader};
-use gyre_stage::{Manifest, clock, source::received_of};
 use gyre_supervise::Event;
 use gyre_tools::bar::Bar;
+use gyre_transport::{Manifest, clock, received};
 
 use silence::Silence;
 
@@ -72,7 +72,7 @@ impl Progress {
             return;
         };
         // The source has not begun yet.
-        let Some(received) = received_of(manifest) else {
+        let Some(received) = received::read(manifest) else {
             return;
         };
         if let Some(sentence) = silence.update(&received, clock::now_ns()) {

@@ -2,15 +2,19 @@
 
 use std::{path::Path, process::ExitCode};
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
-use gyre_contract::run::SourceConfig;
+use gyre_client::observer::ObservedRun;
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
+use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_datasets::DatasetOptions;
 use gyre_results::{absolute, map_options};
 use gyre_ros2_bridge::{Bridge, MapSettings, Settings, source};
 use gyre_ros2_messages::Domain;
-use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
+use gyre_stage::Launch;
 use gyre_stages::live_radar::Sizes;
+use gyre_transport::{RunError, wake::Signals};
 
 use crate::arguments::Ros2Arguments;
 
@@ -65,7 +69,7 @@ pub fn receive(
     launch: &Launch,
     source: &SourceConfig,
     options: &DatasetOptions,
-) -> Result<StageCounters, StageError> {
-    let settings = source::Settings::of(source, options).map_err(StageError::Input)?;
+) -> Result<StageCounters, RunError> {
+    let settings = source::Settings::of(source, options).map_err(RunError::Input)?;
     source::run(launch, settings)
 }

@@ -9,22 +9,25 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_configuration::terminal::{Failure, INTERRUPTED, execute_again, own, print};
-use gyre_configuration::{Configuration, describe_masks, describe_objects, with_stored_options};
+use gyre_configuration::{
+    Configuration, describe_masks, describe_objects,
+    terminal::{Failure, INTERRUPTED, execute_again, own, print},
+    with_stored_options,
+};
 use gyre_contract::run::Ending;
 use gyre_datasets::GnssLog;
 use gyre_geometry::samples::GnssKind;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
-use gyre_stage::{
-    Manifest, StageError,
+use gyre_storage as storage;
+use gyre_supervise::{Plan, SuperviseError, supervise};
+use gyre_tools::operate::detach_if_asked;
+use gyre_transport::{
+    Manifest, RunError,
     run::{RunRoot, sweep},
     sessions::{BEGUN, log_session},
     wake::{Signals, let_signals_end_the_process},
 };
-use gyre_storage as storage;
-use gyre_supervise::{Plan, SuperviseError, supervise};
-use gyre_tools::operate::detach_if_asked;
 
 use crate::{
     arguments::RunArguments,
@@ -167,7 +170,7 @@ fn play(
     let (mut notifier, mut signals) = (Notifier::of_environment(), None);
     let mut ask = |it: &Configuration| waiting::for_radar(it, &out, (&mut notifier, &mut signals));
     let ready = match make_ready(configuration, programs, &out, earlier, &mut ask) {
-        Err(error) if matches!(error.downcast_ref(), Some(StageError::Stopped)) => {
+        Err(error) if matches!(error.downcast_ref(), Some(RunError::Stopped)) => {
             return Ok(ExitCode::from(INTERRUPTED));
         }
         ready => ready?,
@@ -181,7 +184,7 @@ fn play(
         out = earlier::close(out, reason)?;
     }
     let root = match RunRoot::acquire(out.path(), &signals) {
-        Err(StageError::Stopped) => return Ok(ExitCode::from(INTERRUPTED)),
+        Err(RunError::Stopped) => return Ok(ExitCode::from(INTERRUPTED)),
         root => root?,
     };
     preflight::check_shared_memory(&checked.footprint)?;

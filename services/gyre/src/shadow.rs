@@ -4,13 +4,17 @@
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
+use gyre_client::{control::Control, observer::ObservedRun};
 use gyre_configuration::terminal::{Failure, own, print, seconds, words};
-use gyre_contract::run::{Scheduling, StageConfig};
-use gyre_contract::{FollowerId, Footprint, StageId, Window};
+use gyre_contract::{
+    FollowerId, Footprint, StageId, Window,
+    run::{Scheduling, StageConfig},
+};
 use gyre_results::{Content, Out};
-use gyre_stage::{control::Control, observer::ObservedRun};
-use gyre_tools::conformance::shadow::{self, Options, STAGES};
-use gyre_tools::operate::{RunChoice, chosen};
+use gyre_tools::{
+    conformance::shadow::{self, Options, STAGES},
+    operate::{RunChoice, chosen},
+};
 
 use crate::preflight;
 

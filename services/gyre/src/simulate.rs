@@ -8,8 +8,10 @@ use std::{
 };
 
 use clap::Args;
-use gyre_configuration::strict::path_value;
-use gyre_configuration::terminal::{Failure, inputs::configuration, print};
+use gyre_configuration::{
+    strict::path_value,
+    terminal::{Failure, inputs::configuration, print},
+};
 use gyre_results::Content;
 use gyre_simulator::{
     OutputFormat, SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset,

@@ -2,8 +2,10 @@
 
 use std::env;
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, execute_again};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, execute_again},
+};
 use gyre_contract::run::LinkConfig;
 use gyre_link::ONE_THREAD;
 

@@ -7,16 +7,23 @@ use std::{
     process::ExitCode,
 };
 
-use gyre_configuration::terminal::{own, print};
-use gyre_configuration::{process_names, simulated_samples};
-use gyre_contract::run::{SourceConfig, SourceKind, StageConfig};
-use gyre_contract::{FollowerId, StageId};
+use gyre_configuration::{
+    process_names, simulated_samples,
+    terminal::{own, print},
+};
+use gyre_contract::{
+    FollowerId, StageId,
+    run::{SourceConfig, SourceKind, StageConfig, StageCounters},
+};
 use gyre_datasets::DatasetOptions;
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
-use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
-use gyre_stages::live_radar::Settings;
-use gyre_stages::radar_replay::Pace;
-use gyre_stages::search::{python, rotation, translation};
+use gyre_stage::{Launch, launch};
+use gyre_stages::{
+    live_radar::Settings,
+    radar_replay::Pace,
+    search::{python, rotation, translation},
+};
+use gyre_transport::{Manifest, RunError};
 use rustix::{
     process::{Pid, getppid},
     thread::set_name,
@@ -24,7 +31,7 @@ use rustix::{
 
 use crate::program;
 
-type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, StageError>>;
+type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, RunError>>;
 
 /// Runs a stage or a follower by its name, with a function of Python if one is given.
 pub fn run(name: &str, python: Option<PathBuf>) -> ExitCode {
@@ -81,7 +88,7 @@ fn work_of_follower(follower: FollowerId) -> Work {
 }
 
 /// A command of the configuration may name a different build.
-fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
+fn require_same_build(manifest: &Manifest) -> Result<(), RunError> {
     let path = own();
     let supervisor = PathBuf::from(format!(
         "/proc/{}/exe",
@@ -92,17 +99,17 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     if file(&path).is_some_and(|own| file(&supervisor) == Some(own)) {
         return Ok(());
     }
-    let build = program::digest(&path).map_err(|source| StageError::File { path, source })?;
+    let build = program::digest(&path).map_err(|source| RunError::File { path, source })?;
     match build == manifest.build {
         true => Ok(()),
-        false => Err(StageError::Input(
+        false => Err(RunError::Input(
             "this is another build of gyre than the one that runs: name that one in the stage's command".to_owned(),
         )),
     }
 }
 
 /// Integrates motions to poses, or leaves that to the other side of a link.
-fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
+fn integrate(launch: &Launch) -> Result<StageCounters, RunError> {
     #[cfg(feature = "link")]
     if is_side(launch, gyre_contract::run::Side::Robot)? {
         return gyre_link::run_robot(launch);
@@ -112,13 +119,13 @@ fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
 
 /// A build without the feature refuses to begin a split run.
 #[cfg(feature = "link")]
-fn is_side(launch: &Launch, side: gyre_contract::run::Side) -> Result<bool, StageError> {
+fn is_side(launch: &Launch, side: gyre_contract::run::Side) -> Result<bool, RunError> {
     let link: gyre_contract::run::LinkConfig = launch.section("link")?;
     Ok(link.side == Some(side))
 }
 
-fn play(launch: &Launch) -> Result<StageCounters, StageError> {
-    let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
+fn play(launch: &Launch) -> Result<StageCounters, RunError> {
+    let input = |error: &dyn std::error::Error| RunError::Input(error.to_string());
     #[cfg(feature = "link")]
     if is_side(launch, gyre_contract::run::Side::Base)? {
         return gyre_link::run_base(launch);

@@ -3,10 +3,11 @@
 use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, inputs::Inputs, own, print};
-use gyre_contract::StageId;
-use gyre_contract::run::Scenario;
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, inputs::Inputs, own, print},
+};
+use gyre_contract::{StageId, run::Scenario};
 use gyre_matching::RefinementKind;
 use gyre_results::{
     Content, Out,

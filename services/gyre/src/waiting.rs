@@ -7,12 +7,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
+use gyre_contract::control::Status;
 use gyre_results::Out;
-use gyre_stage::{StageError, control::Status, run::RunRoot, wake::Signals};
 use gyre_stages::live_radar::{AskError, Sizes};
 use gyre_supervise::wait;
+use gyre_transport::{RunError, run::RunRoot, wake::Signals};
 
 use crate::{notify::Notifier, preflight::ask};
 
@@ -80,5 +83,5 @@ pub fn for_radar(
         notifier.keep_alive();
         None
     });
-    answer?.ok_or(StageError::Stopped)?
+    answer?.ok_or(RunError::Stopped)?
 }

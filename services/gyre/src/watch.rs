@@ -3,10 +3,11 @@
 use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 
 use clap::Args;
+use gyre_client::observer::ObservedRun;
 use gyre_configuration::terminal::{Failure, print};
 use gyre_results::absolute;
-use gyre_stage::{observer::ObservedRun, wake::Signals};
 use gyre_tools::operate::RunChoice;
+use gyre_transport::wake::Signals;
 use gyre_watch::{Endpoint, Server, Token};
 
 use crate::earlier;

@@ -3,7 +3,7 @@
 use gyre_contract::Masked;
 use gyre_geometry::SparsePoint;
 use gyre_journal::JournalError;
-use gyre_stage::{StageError, reader::Received};
+use gyre_transport::{RunError, reader::Received};
 
 pub mod followers;
 pub mod live_radar;
@@ -14,14 +14,14 @@ pub mod refinement;
 pub mod search;
 
 /// The error for a file of the run: a process that was killed, and is not gone yet, may have it.
-fn unusable(error: JournalError) -> StageError {
+fn unusable(error: JournalError) -> RunError {
     match error.is_busy() {
-        true => StageError::Transient(format!("cannot open a file of the run: {error}")),
-        false => StageError::input(error),
+        true => RunError::Transient(format!("cannot open a file of the run: {error}")),
+        false => RunError::input(error),
     }
 }
 
-fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
+fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], RunError> {
     let points = scan.header().points(scan.values());
     points.ok_or_else(|| scan.malformed("its points do not fit its header"))
 }

@@ -13,9 +13,10 @@ mod turn_counter;
 use std::time::Duration;
 
 use gyre_colossus::{Address, BadAddress};
-use gyre_contract::run::SourceConfig;
+use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_datasets::DatasetOptions;
-use gyre_stage::{Launch, StageCounters, StageError, source};
+use gyre_stage::{Launch, source};
+use gyre_transport::RunError;
 
 pub use ask::{AskError, Sizes, ask};
 pub use gyre_colossus::PORT;
@@ -23,7 +24,7 @@ pub use intake::{Intake, NoScans};
 
 use connection::RadarParser;
 
-pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, RunError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)
 }

@@ -8,21 +8,20 @@ mod motions;
 mod python;
 mod scans;
 
-use gyre_contract::{Item, Masked, MaskedHeader, StageId, flag, mask_kind};
-use gyre_geometry::Twist;
-use gyre_geometry::samples::DopplerConfig;
+use gyre_contract::{Item, Masked, MaskedHeader, StageId, flag, mask_kind, run::StageCounters};
+use gyre_geometry::{Twist, samples::DopplerConfig};
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_radar::{
     DopplerEstimator, LostAzimuthFinder, LostAzimuths, PlacedRows, PointsConfig, RasterConfig,
     lost::stale_rows,
 };
-use gyre_stage::{Launch, Stage, StageCounters, StageError, stage, writer::Draft};
-
+use gyre_stage::{Launch, Stage, stage};
+use gyre_transport::{RunError, writer::Draft};
 use scans::{MovedScan, ScanView, Scans};
 
 pub use python::python;
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     work(launch, launch.section("masking")?, None)
 }
 
@@ -30,9 +29,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 pub fn run_with(
     launch: &Launch,
     function: Box<dyn MaskFunction>,
-) -> Result<StageCounters, StageError> {
+) -> Result<StageCounters, RunError> {
     if launch.manifest.limits.rasters != 1 {
-        return Err(StageError::Input(
+        return Err(RunError::Input(
             "a function masks one scan at a time, and the network of this run two: name the function when the run is begun, or choose masking.kind `threshold`"
                 .to_owned(),
         ));
@@ -48,7 +47,7 @@ fn work(
     launch: &Launch,
     config: MaskingConfig,
     function: Option<Box<dyn MaskFunction>>,
-) -> Result<StageCounters, StageError> {
+) -> Result<StageCounters, RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     let points: PointsConfig = launch.section("points")?;
     let doppler: DopplerConfig = launch.section("doppler")?;
@@ -59,7 +58,7 @@ fn work(
     let mut masking = Masking {
         raster,
         config,
-        masker: masker.map_err(StageError::input)?,
+        masker: masker.map_err(RunError::input)?,
         azimuths: Azimuths::default(),
         doppler: doppler.is_used().then(DopplerEstimator::default),
         min_range_m: points.min_range_m,
@@ -84,14 +83,10 @@ impl Stage for Masking {
     type Output = Masked;
     const HOP: StageId = StageId::Masking;
 
-    fn process(
-        &mut self,
-        input: ScanView<'_>,
-        output: &mut Draft<Masked>,
-    ) -> Result<(), StageError> {
+    fn process(&mut self, input: ScanView<'_>, output: &mut Draft<Masked>) -> Result<(), RunError> {
         let scan = input.current.scan;
         let failed = |error: MaskError| match error {
-            MaskError::Function(reason) => StageError::Transient(reason),
+            MaskError::Function(reason) => RunError::Transient(reason),
             error => scan.malformed(error.to_string()),
         };
         let [rows, previous_rows] = &mut self.rows;
@@ -168,7 +163,7 @@ fn sweep<'a>(
     input: &MovedScan<'a>,
     azimuths: &mut Azimuths,
     rows: &'a mut PlacedRows,
-) -> Result<Sweep<'a>, StageError> {
+) -> Result<Sweep<'a>, RunError> {
     let received = input.scan;
     let scan = received.header().view(received.values());
     let scan =

@@ -2,21 +2,21 @@
 //! pose before it is published. With SLAM it logs keyframes, with objects each scan. In live mode
 //! poses continue when the disk is full, and are not kept from then on.
 
-use gyre_contract::{Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag};
+use gyre_contract::{
+    Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag, run::StageCounters,
+};
 use gyre_journal::{self as journal, Journal, PoseLog, keyframes::Keyframes, scans::Scans};
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
-use gyre_stage::{
-    Launch, Manifest, Sink, StageCounters, StageError, clock,
-    follower::{LogId, Notifier},
-    reader::Received,
-    sink,
-};
+use gyre_stage::{Launch, Sink, sink};
 use gyre_storage::{continue_when_full, was_full};
+use gyre_transport::{
+    Manifest, RunError, clock, reader::Received, services::LogId, transport::Notifier,
+};
 
 use crate::{points, unusable};
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let out = &launch.manifest.out;
     if launch.manifest.live {
@@ -32,11 +32,11 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut logs: Vec<(Box<dyn PoseLog>, Notifier)> = Vec::new();
     if slam.is_on() {
         let keyframes = Keyframes::open(out, known, ended, points).map_err(unusable)?;
-        logs.push((Box::new(keyframes), LogId::Keyframes.growth(launch)?));
+        logs.push((Box::new(keyframes), LogId::Keyframes.growth(&launch.node)?));
     }
     if objects.is_on() {
         let scans = Scans::open(out, known, ended, points).map_err(unusable)?;
-        logs.push((Box::new(scans), LogId::Scans.growth(launch)?));
+        logs.push((Box::new(scans), LogId::Scans.growth(&launch.node)?));
     }
     let mut integration = Integration {
         journal,
@@ -69,7 +69,7 @@ impl Sink for Integration {
         !self.logs.is_empty()
     }
 
-    fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
+    fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), RunError> {
         self.journal.last(count).map_err(unusable)
     }
 
@@ -77,7 +77,7 @@ impl Sink for Integration {
         &mut self,
         motion: &MotionHeader,
         scan: Option<&Received<Masked>>,
-    ) -> Result<PoseHeader, StageError> {
+    ) -> Result<PoseHeader, RunError> {
         let mut pose = compose(self.last.as_ref(), motion);
         pose.item.hop_mut(Self::HOP).finished_ns = clock::now_ns();
         if let Some(scan) = scan {
@@ -101,7 +101,7 @@ impl Sink for Integration {
         Ok(pose)
     }
 
-    fn end(&mut self, item: &Item) -> Result<(), StageError> {
+    fn end(&mut self, item: &Item) -> Result<(), RunError> {
         for (log, growth) in &mut self.logs {
             log.end().map_err(unusable)?;
             growth.notify()?;
@@ -120,17 +120,17 @@ impl Sink for Integration {
 impl Integration {
     /// Waits until all that was written survives a power failure: a failure is found by nobody
     /// after this process.
-    fn sync(&self) -> Result<(), StageError> {
+    fn sync(&self) -> Result<(), RunError> {
         let mut logs = self.logs.iter();
         logs.try_for_each(|(log, _)| log.sync()).map_err(unusable)?;
         self.journal.sync().map_err(unusable)
     }
 
-    fn require_kept(&self) -> Result<(), StageError> {
+    fn require_kept(&self) -> Result<(), RunError> {
         let (Some(loss), Some(last)) = (&self.loss, self.last) else {
             return Ok(());
         };
         let seq = last.item.seq;
-        Err(StageError::Input(format!("{loss}; the last pose is {seq}")))
+        Err(RunError::Input(format!("{loss}; the last pose is {seq}")))
     }
 }

@@ -9,16 +9,18 @@ mod player;
 
 use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path};
 
-use gyre_contract::run::{PlayedFrom, SourceConfig};
-use gyre_contract::{ScanHeader, StageId};
+use faults::Faults;
+use gyre_contract::{
+    ScanHeader, StageId,
+    run::{PlayedFrom, SourceConfig, StageCounters},
+};
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_geometry::samples::{GyroConfig, WheelsConfig};
 use gyre_stage::{
-    Launch, Source, StageCounters, StageError,
+    Launch, Source,
     source::{self, Unreadable},
 };
-
-use faults::Faults;
+use gyre_transport::RunError;
 pub use listing::Listing;
 pub use player::{Player, play_recorded};
 
@@ -35,7 +37,7 @@ pub enum Pace {
     OnDemand,
 }
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let config: SourceConfig = launch.section("source")?;
     if config.from != PlayedFrom::Scan {
         return play_recorded(launch);
@@ -55,7 +57,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let (gyro, wheels): (GyroConfig, WheelsConfig) =
         (launch.section("gyro")?, launch.section("wheels")?);
     let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
-    let samples = samples.map_err(StageError::input)?;
+    let samples = samples.map_err(RunError::input)?;
     play(launch, dataset, samples, Pace::Sensor)
 }
 
@@ -78,7 +80,7 @@ pub fn play(
     dataset: Box<dyn Dataset>,
     samples: ScanSamples,
     pace: Pace,
-) -> Result<StageCounters, StageError> {
+) -> Result<StageCounters, RunError> {
     let config: SourceConfig = launch.section("source")?;
     let once = config.played(dataset.scans());
     let first_ns = dataset.nominal_stamp_ns(once.start);

@@ -1,6 +1,6 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
-use gyre_contract::{Item, Masked, Motion, Refined, StageId, flag};
+use gyre_contract::{Item, Masked, Motion, Refined, StageId, flag, run::StageCounters};
 use gyre_geometry::samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_journal::{
     checkpoint::{self, Checkpoint},
@@ -9,22 +9,22 @@ use gyre_journal::{
 use gyre_matching::{Aiding, RefinementConfig, Refiner};
 use gyre_radar::PointsConfig;
 use gyre_stage::{
-    Launch, Stage, StageCounters, StageError,
+    Launch, Stage,
     inputs::{Joined, JoinedView},
     stage,
-    writer::Draft,
 };
+use gyre_transport::{RunError, writer::Draft};
 
 use crate::{points, unusable};
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
     let gyro: GyroConfig = launch.section("gyro")?;
     let wheels: WheelsConfig = launch.section("wheels")?;
     let doppler: DopplerConfig = launch.section("doppler")?;
     let refiner = Refiner::new(&config, points.capacity)
-        .map_err(StageError::input)?
+        .map_err(RunError::input)?
         .with_sensors(&gyro, &wheels, &doppler);
     launch.take_place()?;
     let manifest = &launch.manifest;
@@ -59,7 +59,7 @@ impl Stage for RefinementStage {
         &mut self,
         input: JoinedView<'_, Masked, Motion>,
         output: &mut Draft<Refined>,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         let (item, motion) = (*input.pair.current.item(), input.other.header().motion);
         self.restore_state_before(&item)?;
         output.header().motion = match input.pair.previous {
@@ -96,7 +96,7 @@ impl Stage for RefinementStage {
 }
 
 impl RefinementStage {
-    fn restore_state_before(&mut self, item: &Item) -> Result<(), StageError> {
+    fn restore_state_before(&mut self, item: &Item) -> Result<(), RunError> {
         let starts_chain = item.is(flag::BREAK);
         if self.next != Some(item.seq) {
             let before = item.seq.saturating_sub(1);

@@ -20,9 +20,9 @@ mod topics;
 
 use std::{io, path::Path, time::Duration};
 
+use gyre_client::{RunError, wake::Signals};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::StageId;
-use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::{SuperviseError, rig::Rig};
 
 pub use harness::Candidate;
@@ -67,14 +67,14 @@ impl Test {
         let out = self.candidate.manifest.out.join(name);
         let rig = self.candidate.rig(out, signals)?;
         let root = &rig.manifest().root;
-        (self.prepare)(root).map_err(StageError::file(root))?;
+        (self.prepare)(root).map_err(RunError::file(root))?;
         Ok(rig)
     }
 }
 
 /// Tests a program; `observe` receives the name of each scenario.
 /// Breaches of the contract are in the report, not in the error. A signal ends the test with
-/// [`StageError::Stopped`].
+/// [`RunError::Stopped`].
 pub fn check(
     test: &Test,
     signals: &Signals,

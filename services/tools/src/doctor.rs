@@ -2,13 +2,11 @@
 
 use std::{collections::BTreeSet, fs, process::ExitCode};
 
+use gyre_client::run::{SHARED_MEMORY, free_shared_memory};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::Footprint;
 use gyre_masking::networks::runtime::{self, RuntimeError};
-use gyre_stage::{
-    python_function::Interpreter,
-    run::{SHARED_MEMORY, free_shared_memory},
-};
+use gyre_stage::python_function::Interpreter;
 
 const GOVERNORS: &str = "/sys/devices/system/cpu/cpufreq";
 

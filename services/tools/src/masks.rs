@@ -8,11 +8,12 @@ pub mod picture;
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::describe_masks_in_process;
-use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
-use gyre_results::Content;
-
 use drawing::Canvas;
+use gyre_configuration::{
+    describe_masks_in_process,
+    terminal::{Failure, inputs::Inputs, print},
+};
+use gyre_results::Content;
 use inspector::MaskInspector;
 
 /// Number of scans that are drawn by default, and maximum on the overview.

@@ -1,7 +1,7 @@
 //! The commands that operate running runs: `gyre up`, `down`, `ps`, `logs`, `top`, `restart`,
 //! `swap` and `echo`.
 //!
-//! Each asks the supervisor of a run at its control socket ([`gyre_stage::control`]); nothing of a
+//! Each asks the supervisor of a run at its control socket ([`gyre_client::control`]); nothing of a
 //! run is looked up elsewhere, but its logs.
 
 mod background;

@@ -5,9 +5,11 @@ mod server;
 
 use std::{process::ExitCode, time::Duration};
 
-use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
-use gyre_configuration::{Configuration, Played};
-use gyre_stage::wake::Signals;
+use gyre_client::wake::Signals;
+use gyre_configuration::{
+    Configuration, Played,
+    terminal::{Failure, inputs::Inputs, print},
+};
 
 pub use arguments::RadarServerArguments;
 pub(crate) use server::configuration;

@@ -17,8 +17,7 @@ pub mod witness_fault;
 
 use std::{ops::Range, path::PathBuf, time::Duration};
 
-use gyre_contract::StageId;
-use gyre_contract::run::Budget;
+use gyre_contract::{StageId, run::Budget};
 
 pub use campaign::{Options, stress};
 pub use gyre_contract::run::Scenario;

@@ -11,16 +11,20 @@ use std::{
     time::Duration,
 };
 
-use gyre_contract::run::{
-    Budget, LinkConfig, Mode, PlayedFrom, RecordConfig, RunConfig, Scenario, Side, SourceConfig,
-    SourceKind, StageConfig,
+use gyre_contract::{
+    FollowerId, StageId, Window,
+    run::{
+        Budget, LinkConfig, Mode, PlayedFrom, RecordConfig, RunConfig, Scenario, Side,
+        SourceConfig, SourceKind, StageConfig,
+    },
 };
-use gyre_contract::{FollowerId, StageId, Window};
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::samples::GnssConfig;
 use gyre_masking::MaskKind;
-use gyre_matching::RefinementKind;
-use gyre_matching::odometry::{OdometryConfig, SearchKind};
+use gyre_matching::{
+    RefinementKind,
+    odometry::{OdometryConfig, SearchKind},
+};
 use gyre_objects::ObjectsConfig;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;

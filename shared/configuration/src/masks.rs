@@ -3,8 +3,11 @@
 use std::error::Error;
 
 use gyre_contract::StageId;
-use gyre_masking::networks::runtime::{INSTALL, RuntimeError};
-use gyre_masking::{MaskKind, MaskingConfig, model::Card};
+use gyre_masking::{
+    MaskKind, MaskingConfig,
+    model::Card,
+    networks::runtime::{INSTALL, RuntimeError},
+};
 use gyre_matching::odometry::OdometryConfig;
 
 use crate::configuration::Configuration;

@@ -6,6 +6,7 @@
 
 mod basis;
 mod check;
+pub mod control;
 mod follower;
 mod item;
 mod limits;

@@ -1,8 +1,10 @@
 //! `masked`: masked Cartesian rasters and the scan's sparse points.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::samples::{DopplerVelocity, GyroTurn, WheelDistance};
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::{
+    SparsePoint, Twist,
+    samples::{DopplerVelocity, GyroTurn, WheelDistance},
+};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{

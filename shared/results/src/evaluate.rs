@@ -8,13 +8,15 @@ use std::{
     process::ExitCode,
 };
 
-use crate::evaluation::{Evaluation, MatchedMotions, NeesOptions, TimedMotion, TruthSigma, part};
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
 use gyre_datasets::ground_truth::read_trajectory;
 use gyre_radar::Trajectory;
 
 use crate::{
+    evaluation::{Evaluation, MatchedMotions, NeesOptions, TimedMotion, TruthSigma, part},
     judgement::{Judgement, judge_by, judge_motions, note_time_offset, take_time_offset_out},
     odometry,
     out::{Content, Out, require_results},

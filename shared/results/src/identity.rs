@@ -7,8 +7,9 @@ use std::{
     path::Path,
 };
 
-use gyre_configuration::terminal::Failure;
-use gyre_configuration::{Configuration, difference, fingerprint, with_stored_options};
+use gyre_configuration::{
+    Configuration, difference, fingerprint, terminal::Failure, with_stored_options,
+};
 use gyre_contract::run::BEGUN_WITH;
 use gyre_datasets::{DatasetOptions, Fingerprint};
 use gyre_storage as storage;

@@ -13,22 +13,24 @@ mod slam;
 
 use std::path::{Path, PathBuf};
 
-use crate::evaluation::{NeesOptions, plot::bands_svg};
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
+use files::Files;
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
 use gyre_contract::StageId;
 use gyre_datasets::ground_truth::{find_ground_truth, read_trajectory};
 use gyre_journal as journal;
 use gyre_radar::Trajectory;
+use pass::{MOST_JUDGED, Pass, Read};
+use slam::Slam;
 
 use crate::{
+    evaluation::{NeesOptions, plot::bands_svg},
     judgement::{Judgement, judge, judge_motions, note_time_offset},
     out::{Out, SIMULATED_TRUTH, SUMMARY},
     summary::{Measured, Session, SlamSummary, Summary},
 };
-use files::Files;
-use pass::{MOST_JUDGED, Pass, Read};
-use slam::Slam;
 
 pub use map::map_options;
 

@@ -9,9 +9,13 @@ mod slam;
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
-use gyre_contract::run::latency::{Latency, Percentiles};
-use gyre_contract::run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
-use gyre_contract::{Footprint, StageId};
+use gyre_contract::{
+    Footprint, StageId,
+    run::{
+        Ending, Mode, Rate, Report, StageCounters, Swapped,
+        latency::{Latency, Percentiles},
+    },
+};
 use gyre_masking::{MaskKind, MaskingConfig};
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -7,9 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::episodes::Episodes;
-use crate::path::Path;
-use crate::stream::Stream;
+use crate::{episodes::Episodes, path::Path, stream::Stream};
 
 pub(crate) const FILE: &str = "gnss.csv";
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";
@@ -89,8 +87,7 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SimulationConfig;
-    use crate::simulator::Simulator;
+    use crate::{SimulationConfig, simulator::Simulator};
 
     fn fixes_of(simulator: &Simulator) -> Option<Vec<RawFix>> {
         let config = simulator.config();

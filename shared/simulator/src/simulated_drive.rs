@@ -8,19 +8,21 @@ use std::path::PathBuf;
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
 use gyre_geometry::samples::{RawFix, Sample};
 use gyre_radar::{OwnedScan, ScanSlot};
-
-use crate::cars;
-use crate::config::SimulationConfig;
-use crate::error::SimulatorError;
-use crate::gyro::log;
-use crate::layout::{SideFile, boreas, oxford, radiate};
-use crate::output::OutputFormat;
-use crate::profile::{Chirp, METADATA_BYTES};
-use crate::sensor::Sensor;
-use crate::simulator::Simulator;
-use crate::truth;
-use crate::{gnss, wheels};
 use render_ahead::Ahead;
+
+use crate::{
+    cars,
+    config::SimulationConfig,
+    error::SimulatorError,
+    gnss,
+    gyro::log,
+    layout::{SideFile, boreas, oxford, radiate},
+    output::OutputFormat,
+    profile::{Chirp, METADATA_BYTES},
+    sensor::Sensor,
+    simulator::Simulator,
+    truth, wheels,
+};
 
 #[derive(Clone)]
 pub struct SimulatedDrive {

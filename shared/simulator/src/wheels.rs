@@ -1,7 +1,6 @@
 use std::fmt::Write as _;
 
-use gyre_geometry::Twist;
-use gyre_geometry::samples::Sample;
+use gyre_geometry::{Twist, samples::Sample};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -113,8 +112,7 @@ impl<'a> Wheels<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SimulationConfig;
-    use crate::simulator::Simulator;
+    use crate::{SimulationConfig, simulator::Simulator};
 
     fn simulated(faults: bool) -> (Simulator, Vec<Sample>) {
         let config = SimulationConfig {

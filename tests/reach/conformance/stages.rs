@@ -4,10 +4,12 @@
 use std::{env, fs, thread, time::Duration};
 
 use gyre_contract::{
-    Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
+    Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId,
+    flag, run::StageCounters,
 };
-use gyre_stage::{Launch, StageCounters, StageError, clock, run::STANDBY, writer::TopicWriter};
+use gyre_stage::Launch;
 use gyre_supervise::rig::{Recorded, Tap};
+use gyre_transport::{RunError, clock, run::STANDBY, writer::TopicWriter};
 
 /// The environment variable with the fault of a stage.
 pub const BREACH: &str = "GYRE_TEST_BREACH";
@@ -24,10 +26,10 @@ const HIDDEN: Duration = Duration::from_millis(120);
 const FLOOD: usize = 500;
 
 /// Works as the rotation search, or for a breach of masking as masking.
-pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, StageError> {
+pub fn play(launch: &Launch, breach: &str) -> Result<StageCounters, RunError> {
     if breach == "does not wait" && env::var_os(STANDBY).is_some() {
         let ready = launch.manifest.root.join("rotation-search.ready");
-        fs::write(ready, "").map_err(|error| StageError::Input(error.to_string()))?;
+        fs::write(ready, "").map_err(|error| RunError::Input(error.to_string()))?;
     }
     let silently = breach == "joins silently";
     let is_masking = breach.starts_with("masking ");
@@ -83,7 +85,7 @@ impl Broken<'_> {
         self.breach == breach
     }
 
-    fn run(&mut self) -> Result<(), StageError> {
+    fn run(&mut self) -> Result<(), RunError> {
         loop {
             let stops = self.launch.signals.sleep(REST)?;
             if (stops && !self.does("hangs")) || (self.ended && self.does("leaves at the end")) {
@@ -97,7 +99,7 @@ impl Broken<'_> {
         }
     }
 
-    fn receive_motion(&mut self) -> Result<bool, StageError> {
+    fn receive_motion(&mut self) -> Result<bool, RunError> {
         let motion = self.motions.as_ref().map(Recorded::receive).transpose()?;
         let Some(motion) = motion.flatten() else {
             return Ok(false);
@@ -107,7 +109,7 @@ impl Broken<'_> {
     }
 
     /// Processes the next item; returns whether there was one.
-    fn advance(&mut self) -> Result<bool, StageError> {
+    fn advance(&mut self) -> Result<bool, RunError> {
         let Some(message) = self.receive()? else {
             return Ok(false);
         };
@@ -118,7 +120,7 @@ impl Broken<'_> {
         if let Some(expected) = self.next.filter(|next| item.seq > *next)
             && !self.does("swallows")
         {
-            return Err(StageError::gap("of the test", expected, item.seq));
+            return Err(RunError::gap("of the test", expected, item.seq));
         }
         if !self.has_motion(item.seq) {
             self.waiting = Some(message);
@@ -132,7 +134,7 @@ impl Broken<'_> {
             true => self.end(&item)?,
             false if self.answered >= ENOUGH && self.does("falls silent") => {}
             false if self.answered >= ENOUGH && self.does("dies") => {
-                return Err(StageError::Input("no memory is left".to_owned()));
+                return Err(RunError::Input("no memory is left".to_owned()));
             }
             false => self.process(&item, message.received_ns)?,
         }
@@ -140,12 +142,12 @@ impl Broken<'_> {
         Ok(true)
     }
 
-    fn receive(&mut self) -> Result<Option<Recorded>, StageError> {
+    fn receive(&mut self) -> Result<Option<Recorded>, RunError> {
         if let Some(message) = self.waiting.take() {
             return Ok(Some(message));
         }
         match Recorded::receive(&self.input) {
-            Err(StageError::Malformed { .. }) if self.does("swallows") => Ok(None),
+            Err(RunError::Malformed { .. }) if self.does("swallows") => Ok(None),
             received => received,
         }
     }
@@ -157,7 +159,7 @@ impl Broken<'_> {
         !self.does("masking too patient") || before.is_none() || self.newest_motion >= before
     }
 
-    fn process(&self, item: &Item, received_ns: i64) -> Result<(), StageError> {
+    fn process(&self, item: &Item, received_ns: i64) -> Result<(), RunError> {
         if self.does("skips") && item.seq == WRONG {
             return Ok(());
         }
@@ -192,7 +194,7 @@ impl Broken<'_> {
         (0..copies).try_for_each(|_| output.send(&self.output))
     }
 
-    fn output_about(&self, item: Item) -> Result<Recorded, StageError> {
+    fn output_about(&self, item: Item) -> Result<Recorded, RunError> {
         if self.stage == StageId::Masking {
             return Ok(self.mask(item));
         }
@@ -222,7 +224,7 @@ impl Broken<'_> {
         Recorded::of::<Masked>(&header, &vec![0; limits.raster_cells * 4], 0)
     }
 
-    fn end(&mut self, item: &Item) -> Result<(), StageError> {
+    fn end(&mut self, item: &Item) -> Result<(), RunError> {
         self.ended = true;
         if self.does("keeps the end") {
             return Ok(());

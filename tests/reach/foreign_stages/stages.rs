@@ -3,21 +3,20 @@
 use std::{env, path::Path, thread, time::Duration};
 
 use bytemuck::Pod;
-use gyre_contract::run::SourceConfig;
 use gyre_contract::{
     Item, Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined,
     Rotation, Scan, ScanHeader, StageId, compose, flag,
+    run::{SourceConfig, StageCounters},
 };
 use gyre_datasets::{Dataset, DatasetOptions};
 use gyre_stage::{
-    Launch, Sink, Source, Stage, StageCounters, StageError,
+    Launch, Sink, Source, Stage,
     inputs::{Joined, JoinedView, PairView, Pairs},
-    reader::Received,
     sink,
     source::{self, Unreadable},
     stage,
-    writer::Draft,
 };
+use gyre_transport::{RunError, reader::Received, writer::Draft};
 
 /// The item that is sent wrong.
 pub const FAULTY: u64 = 7;
@@ -26,7 +25,7 @@ pub const FAULT: &str = "GYRE_TEST_FAULT";
 /// A file that exists once the fault has been sent, if it is to be sent only once.
 pub const ONCE: &str = "GYRE_TEST_ONCE";
 
-pub fn play(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
+pub fn play(launch: &Launch, fault: Fault) -> Result<StageCounters, RunError> {
     match fault.topic.as_str() {
         "scan" => replay(launch, fault),
         "masked" => stage::run(launch, &mut ForeignMasking(fault)),
@@ -102,7 +101,7 @@ macro_rules! foreign {
                 &mut self,
                 input: $view<'_, $($of),+>,
                 output: &mut Draft<$output>,
-            ) -> Result<(), StageError> {
+            ) -> Result<(), RunError> {
                 let seq = $write(&self.0, &input, output);
                 self.0.edit(output.header(), seq);
                 Ok(())
@@ -177,7 +176,7 @@ fn mask(fault: &Fault, input: &PairView<'_, Scan>, output: &mut Draft<Masked>) -
 }
 
 /// Plays the recording, with a fault in one header.
-fn replay(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
+fn replay(launch: &Launch, fault: Fault) -> Result<StageCounters, RunError> {
     let config: SourceConfig = launch.section("source")?;
     let dataset = gyre_datasets::open(&config.data, &DatasetOptions::default()).unwrap();
     source::run(launch, &mut ForeignSource { fault, dataset }, &config)
@@ -237,7 +236,7 @@ struct ForeignIntegration {
 impl Sink for ForeignIntegration {
     const HOP: StageId = StageId::PoseIntegration;
 
-    fn restore(&mut self, _: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
+    fn restore(&mut self, _: usize) -> Result<(Vec<PoseHeader>, bool), RunError> {
         Ok((Vec::new(), false))
     }
 
@@ -245,14 +244,14 @@ impl Sink for ForeignIntegration {
         &mut self,
         motion: &MotionHeader,
         _: Option<&Received<Masked>>,
-    ) -> Result<PoseHeader, StageError> {
+    ) -> Result<PoseHeader, RunError> {
         let pose = compose(self.last.as_ref(), motion);
         self.last = Some(pose);
         let x_m = self.fault.of("x", pose.item.seq).unwrap_or(pose.x_m);
         Ok(PoseHeader { x_m, ..pose })
     }
 
-    fn end(&mut self, _: &Item) -> Result<(), StageError> {
+    fn end(&mut self, _: &Item) -> Result<(), RunError> {
         Ok(())
     }
 }

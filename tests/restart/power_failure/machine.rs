@@ -6,10 +6,8 @@ use gyre::{
     earlier::{self, Begun, Earlier},
     program,
 };
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::Failure;
-use gyre_contract::run::Ending;
-use gyre_contract::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag};
+use gyre_configuration::{Configuration, terminal::Failure};
+use gyre_contract::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag, run::Ending};
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::SparsePoint;
 use gyre_journal::{

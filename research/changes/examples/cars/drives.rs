@@ -1,19 +1,13 @@
 //! Pairs of simulated drives, registered, and kept.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::{env, fs};
+use std::{collections::BTreeMap, path::{Path, PathBuf}, env, fs};
 
 use gyre_datasets::write_tum;
-use gyre_slam::estimation::{Constraint, G2o};
 use gyre_geometry::pose;
 use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, Trajectory};
-use gyre_slam::localisation::{DriveSearch, Localiser, Map};
-use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose};
-use gyre_worlds::drive::{DriveConfig, DriveKind};
-use gyre_worlds::weather::WeatherConfig;
-use gyre_worlds::{SimulatedDrive, SimulationConfig};
+use gyre_slam::{estimation::{Constraint, G2o}, localisation::{DriveSearch, Localiser, Map}, Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose};
+use gyre_worlds::{drive::{DriveConfig, DriveKind}, weather::WeatherConfig, SimulatedDrive, SimulationConfig};
 
 use crate::{Outcome, Pair};
 

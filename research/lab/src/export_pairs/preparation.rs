@@ -3,13 +3,11 @@
 
 use std::collections::VecDeque;
 
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_geometry::{Pose, Twist, xy_yaw};
 use gyre_masking::MaskKind;
-use gyre_matching::odometry::{Odometry, OdometryError, SearchConfig};
+use gyre_matching::{odometry::{Odometry, OdometryError, SearchConfig}, RefinementKind};
 use gyre_radar::PolarScan;
-use gyre_matching::RefinementKind;
-use gyre_configuration::terminal::Failure;
 use half::{f16, slice::HalfFloatSliceExt};
 
 /// A network masks what networks are trained on.

@@ -2,15 +2,11 @@
 
 use std::{fs, path::Path};
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::{Configuration, terminal::Failure};
 use serde_json::json;
 use toml::Table;
 
-use crate::{
-    recording::{Recording, Track, folder_name},
-    report::{Record, record},
-};
+use crate::{recording::{Recording, Track, folder_name}, report::{Record, record}};
 
 /// The file's first line; a file with another is somebody else's.
 const FIRST_LINE: &str = "# What the .npy file of this name was made of, by gyre export-pairs.\n";

@@ -2,12 +2,10 @@
 
 use std::{hint::black_box, time::Instant};
 
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_masking::{MaskKind, network::Network};
-use gyre_matching::odometry::Odometry;
+use gyre_matching::{odometry::Odometry, JointMatch, Refined};
 use gyre_radar::OwnedScan;
-use gyre_matching::{JointMatch, Refined};
-use gyre_configuration::terminal::Failure;
 use ndarray::Array3;
 
 use crate::models::Model;

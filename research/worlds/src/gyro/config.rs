@@ -3,9 +3,8 @@
 use gyre_geometry::samples::UpAxis;
 use serde::{Deserialize, Serialize};
 
+use crate::{error::SimulatorError, limits::require_within};
 use super::{GyroFigures, GyroProfile};
-use crate::error::SimulatorError;
-use crate::limits::require_within;
 
 /// The gyro, its deviations from its profile, and its clock.
 ///

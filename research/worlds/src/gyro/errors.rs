@@ -6,9 +6,8 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::GyroFigures;
-use super::attitude::MeanMotion;
 use crate::stream::Stream;
+use super::{GyroFigures, attitude::MeanMotion};
 
 /// Steps of a log, of a rad/s and of a m/s².
 const LOG_STEPS: [f64; 2] = [1e9, 1e6];

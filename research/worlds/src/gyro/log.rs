@@ -4,10 +4,7 @@ use std::fmt::Write as _;
 
 use gyre_geometry::samples::{Sample, SampleKind};
 
-use super::attitude::Vehicle;
-use super::clock::Clock;
-use super::config::SimulatedGyroConfig;
-use super::errors::Errors;
+use super::{attitude::Vehicle, clock::Clock, config::SimulatedGyroConfig, errors::Errors};
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "imu.csv";

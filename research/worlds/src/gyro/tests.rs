@@ -3,15 +3,8 @@ use gyre_geometry::samples::{Sample, UpAxis};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
-use super::attitude::MeanMotion;
-use super::clock::Clock;
-use super::errors::{Errors, in_axes};
-use super::log;
-use super::*;
-use crate::config::SimulationConfig;
-use crate::drive::{DriveConfig, DriveKind};
-use crate::simulator::Simulator;
-use crate::{Effects, Realism};
+use crate::{config::SimulationConfig, drive::{DriveConfig, DriveKind}, simulator::Simulator, Effects, Realism};
+use super::{attitude::MeanMotion, clock::Clock, errors::{Errors, in_axes}, log, *};
 
 const RATE_HZ: f64 = 100.0;
 

@@ -4,15 +4,10 @@
 use std::{fmt::Write as _, path::Path};
 
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
-use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw};
-use gyre_matching::odometry::{Odometry, OdometryConfig};
+use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw, samples::{DopplerKind, GyroKind, WheelsKind}};
+use gyre_matching::{odometry::{Odometry, OdometryConfig}, InitialGuess};
 use gyre_radar::OwnedScan;
-use gyre_geometry::samples::{DopplerKind, GyroKind, WheelsKind};
-use gyre_matching::InitialGuess;
-use gyre_worlds::{
-    GyroProfile, OutputFormat, Profile, SimulatedDrive, SimulationConfig, TunnelConfig,
-    drive::DriveConfig,
-};
+use gyre_worlds::{GyroProfile, OutputFormat, Profile, SimulatedDrive, SimulationConfig, TunnelConfig, drive::DriveConfig};
 use nalgebra::Vector3;
 
 /// Way to the tunnel, its length, and the way behind it, m.

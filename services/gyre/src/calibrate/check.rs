@@ -1,8 +1,7 @@
 //! The check of a calibration by the ground truth of the drive.
 
 use gyre_calibration::{Found, toml};
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_datasets::{DatasetOptions, ground_truth::read_trajectory};
 use gyre_geometry::samples::{GyroKind, WheelsKind};
 use gyre_matching::odometry::Odometry;

@@ -6,8 +6,10 @@ use std::path::{Path, absolute};
 use gyre_calibration::{
     ClockError, Drive, GyroCalibration, WheelCalibration, calibrate_gyro, calibrate_wheels,
 };
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
 use gyre_datasets::SampleLog;
 use gyre_geometry::samples::{GyroConfig, GyroKind, WheelsConfig};
 

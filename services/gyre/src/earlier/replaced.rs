@@ -5,8 +5,7 @@
 use std::{ffi::OsStr, fs, path::Path};
 
 use gyre_configuration::terminal::{Failure, print};
-use gyre_contract::flag;
-use gyre_contract::run::COMPLETE;
+use gyre_contract::{flag, run::COMPLETE};
 use gyre_journal::{self as journal, JournalError};
 use gyre_results::{Out, REPLACED as ASIDE, SIMULATED_TRUTH};
 use gyre_storage::{self as storage, StorageError};

@@ -1,6 +1,6 @@
 //! The silence of a live radar, which a run reports while there are no poses to count.
 
-use gyre_stage::source::Received;
+use gyre_contract::control::Received;
 
 /// The silence that is reported first, ns. The next lines come when it has doubled.
 const FIRST_NS: i64 = 3_000_000_000;
@@ -53,7 +53,7 @@ fn seconds(ns: i64) -> i64 {
 
 #[cfg(test)]
 mod tests {
-    use gyre_stage::source::LastScan;
+    use gyre_contract::control::LastScan;
 
     use super::*;
 

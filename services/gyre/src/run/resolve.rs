@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use gyre_configuration::terminal::inputs::Given;
-use gyre_configuration::terminal::{Failure, print};
-use gyre_configuration::{Configuration, calibration, strict::path_value};
+use gyre_configuration::{
+    Configuration, calibration,
+    strict::path_value,
+    terminal::{Failure, inputs::Given, print},
+};
 use gyre_contract::run::PlayedFrom;
 use gyre_results::absolute;
 

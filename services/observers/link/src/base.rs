@@ -13,9 +13,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_contract::run::{LinkConfig, PlayedFrom, Side};
-use gyre_contract::{Item, Message as _, Motion, Pose, flag, topic};
-use gyre_stage::{Launch, StageCounters, StageError, relay::FirstStages, source::RecordedMessage};
+use gyre_client::{RecordedMessage, RunError};
+use gyre_contract::{
+    Item, Message as _, Motion, Pose, flag,
+    run::{LinkConfig, PlayedFrom, Side, StageCounters},
+    topic,
+};
+use gyre_stage::{Launch, relay::FirstStages};
 use zenoh::{
     Session, Wait,
     qos::Priority,
@@ -37,7 +41,7 @@ use crate::{
 const QUIET: Duration = Duration::from_secs(1);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
     let manifest = &launch.manifest;
@@ -96,7 +100,7 @@ struct FromRobot {
 }
 
 impl Base<'_> {
-    fn work(&mut self) -> Result<(), StageError> {
+    fn work(&mut self) -> Result<(), RunError> {
         let Some(start) = self.start()? else {
             return Ok(());
         };
@@ -161,7 +165,7 @@ impl Base<'_> {
 
     /// Waits until pose-integration has published the newest pose; returns the first item that the
     /// stages need. `None` on a request to stop.
-    fn start(&mut self) -> Result<Option<u64>, StageError> {
+    fn start(&mut self) -> Result<Option<u64>, RunError> {
         loop {
             // Sleep first, as the source of scans does.
             if self.stages.sleep(self.waker.descriptor())? {
@@ -185,7 +189,7 @@ impl Base<'_> {
         }
     }
 
-    fn offer(&self) -> Result<ToRobot, StageError> {
+    fn offer(&self) -> Result<ToRobot, RunError> {
         let manifest = &self.launch.manifest;
         let prefix = handshake::prefix(&self.config, Side::Base);
         let mut server = Server::new(&self.session, &prefix, Some(self.waker.clone()));
@@ -243,7 +247,7 @@ impl Base<'_> {
         (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq)
     }
 
-    fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), StageError> {
+    fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), RunError> {
         let newest = self.stages.newest_pose().max(self.resumed_at());
         let published = newest.map_or(0, |newest| newest.saturating_add(1));
         to_robot.poses.set_published(published);
@@ -254,7 +258,7 @@ impl Base<'_> {
     }
 
     /// Answers a robot that starts; true if it is admitted.
-    fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, StageError> {
+    fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, RunError> {
         let ours = Agreement::of(&self.launch.manifest, &self.config, &self.topics);
         let bytes = query.payload().map(|payload| payload.to_bytes());
         let theirs = serde_json::from_slice::<Agreement>(&bytes.unwrap_or_default());
@@ -289,7 +293,7 @@ impl Base<'_> {
         topics: &mut [FromRobot],
         to_robot: &ToRobot,
         end: &mut Option<Item>,
-    ) -> Result<bool, StageError> {
+    ) -> Result<bool, RunError> {
         topics.iter_mut().try_for_each(FromRobot::receive)?;
         let items = topics.iter().map(|topic| topic.next.as_ref()?.item());
         let Some(items) = items.collect::<Option<Vec<Item>>>() else {
@@ -320,12 +324,12 @@ impl Base<'_> {
 
     /// Checks that the next item follows the published ones, and is of the same drive. After a
     /// start some topics may lack an item that was published before.
-    fn check_next(&self, item: &Item, all: &[Item]) -> Result<(), StageError> {
+    fn check_next(&self, item: &Item, all: &[Item]) -> Result<(), RunError> {
         let begins = self.published.is_none() && item.seq < self.next();
         let is_whole = all.iter().all(|other| other.seq == item.seq);
         let follows = is_whole && item.seq == self.next();
         if !begins && !follows {
-            return Err(StageError::Input(format!(
+            return Err(RunError::Input(format!(
                 "the robot sends item {}, but this run needs {}, which the robot no longer has: start both again with --fresh",
                 item.seq,
                 self.next()
@@ -333,7 +337,7 @@ impl Base<'_> {
         }
         let is_resumed = self.resumed_at() == Some(item.seq);
         match is_resumed && item.stamp_ns != self.resumed.stamp_ns {
-            true => Err(StageError::Input(format!(
+            true => Err(RunError::Input(format!(
                 "the robot's scan {} is not the one that this run has a pose of: it plays a different drive; start both again with --fresh",
                 item.scan
             ))),
@@ -348,7 +352,7 @@ impl FromRobot {
         self.next.take_if(is_next)
     }
 
-    fn receive(&mut self) -> Result<(), StageError> {
+    fn receive(&mut self) -> Result<(), RunError> {
         if self.next.is_none() {
             self.next = self.fetcher.next_with_payload(self.header_bytes)?;
         }

@@ -10,8 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::{RecordedMessage, RunError};
 use gyre_contract::{Item, flag};
-use gyre_stage::{StageError, source::RecordedMessage};
 use zenoh::{
     Session, Wait,
     qos::{CongestionControl, Priority},
@@ -103,13 +103,13 @@ impl Fetcher {
     pub fn next_with_payload(
         &self,
         header_bytes: usize,
-    ) -> Result<Option<RecordedMessage>, StageError> {
+    ) -> Result<Option<RecordedMessage>, RunError> {
         let Some(mut header) = self.next() else {
             return Ok(None);
         };
         if header.len() < header_bytes {
             let reason = format!("a message of {} bytes is too short", header.len());
-            return Err(StageError::Input(reason));
+            return Err(RunError::Input(reason));
         }
         let payload = header.split_off(header_bytes);
         Ok(Some(RecordedMessage { header, payload }))

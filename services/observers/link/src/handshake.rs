@@ -3,9 +3,12 @@
 
 use std::{fs, path::Path, thread, time::Duration};
 
-use gyre_contract::run::{BEGUN_WITH, LinkConfig, Side};
-use gyre_contract::{Limits, topic};
-use gyre_stage::{Manifest, StageError};
+use gyre_client::{Manifest, RunError};
+use gyre_contract::{
+    Limits,
+    run::{BEGUN_WITH, LinkConfig, Side},
+    topic,
+};
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
@@ -35,7 +38,7 @@ pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
 
 /// Waits for the robot and asks for the bytes of its largest scan, which a base needs that receives
 /// scans.
-pub fn ask_robot(config: &LinkConfig) -> Result<usize, StageError> {
+pub fn ask_robot(config: &LinkConfig) -> Result<usize, RunError> {
     let pause = || {
         thread::sleep(PAUSE);
         Ok(false)
@@ -135,7 +138,7 @@ pub(crate) fn ask_base(
     session: &Session,
     config: &LinkConfig,
     agreement: &Agreement,
-) -> Result<Option<StartAnswer>, StageError> {
+) -> Result<Option<StartAnswer>, RunError> {
     let payload = serde_json::to_vec(agreement);
     let payload = payload.map_err(|e| failed(ASK_FOR_START.0, &e))?;
     ASK_FOR_START.ask(session, start_key(config), payload)

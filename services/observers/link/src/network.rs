@@ -2,8 +2,8 @@
 
 use std::net::IpAddr;
 
+use gyre_client::RunError;
 use gyre_contract::run::LinkConfig;
-use gyre_stage::StageError;
 
 /// The environment variable, and its value, that make zenoh do all its work in one thread.
 ///
@@ -20,16 +20,16 @@ pub const ONE_THREAD: (&str, &str) = (
 const PRIVATE_ZONES: &str = ".internal .lan .local .home.arpa .test .example .localhost";
 
 /// Checks the endpoints, and that the files of TLS can be read.
-pub fn check(link: &LinkConfig) -> Result<(), StageError> {
+pub fn check(link: &LinkConfig) -> Result<(), RunError> {
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if link.name.is_empty() || !link.name.chars().all(is_word) {
-        return Err(StageError::Input(format!(
+        return Err(RunError::Input(format!(
             "`{}` is no name of a link: it has letters, digits, `-` and `_`",
             link.name
         )));
     }
     if link.listen.is_empty() && link.connect.is_empty() {
-        return Err(StageError::Input(
+        return Err(RunError::Input(
             "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447".to_owned(),
         ));
     }
@@ -41,35 +41,35 @@ pub fn check(link: &LinkConfig) -> Result<(), StageError> {
     // A side that connects also trusts the public authorities (zenoh adds `ca` to them), whose
     // certificates others can have.
     match link.connect.iter().find(|endpoint| is_public(endpoint)) {
-        Some(endpoint) => Err(StageError::Input(format!(
+        Some(endpoint) => Err(RunError::Input(format!(
             "{endpoint} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
         ))),
         None => Ok(()),
     }
 }
 
-fn check_certificates(link: &LinkConfig, endpoint: &str) -> Result<(), StageError> {
+fn check_certificates(link: &LinkConfig, endpoint: &str) -> Result<(), RunError> {
     for (what, path) in [
         ("the authority's certificate (ca)", &link.ca),
         ("a certificate (certificate)", &link.certificate),
         ("a private key (key)", &link.key),
     ] {
         if path.as_os_str().is_empty() {
-            return Err(StageError::Input(format!(
+            return Err(RunError::Input(format!(
                 "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
             )));
         }
         std::fs::read(path).map_err(|reason| {
             let path = path.display();
-            StageError::Input(format!("{what} {path} cannot be read: {reason}"))
+            RunError::Input(format!("{what} {path} cannot be read: {reason}"))
         })?;
     }
     Ok(())
 }
 
-fn is_tls(endpoint: &str) -> Result<bool, StageError> {
+fn is_tls(endpoint: &str) -> Result<bool, RunError> {
     let malformed = || {
-        StageError::Input(format!(
+        RunError::Input(format!(
             "`{endpoint}` is no endpoint: it is tls/HOST:PORT, or on this machine tcp/127.0.0.1:PORT"
         ))
     };
@@ -85,7 +85,7 @@ fn is_tls(endpoint: &str) -> Result<bool, StageError> {
     match protocol {
         "tls" => Ok(true),
         "tcp" if is_loopback(host) => Ok(false),
-        "tcp" => Err(StageError::Input(format!(
+        "tcp" => Err(RunError::Input(format!(
             "{endpoint} would leave this machine unencrypted, and anybody could connect: use tls/ with certificates (docs/link.md); tcp/ is for loopback addresses alone"
         ))),
         _ => Err(malformed()),

@@ -11,10 +11,9 @@ use std::{
     time::Duration,
 };
 
-use gyre_contract::run::LinkConfig;
-use gyre_contract::topic;
+use gyre_client::{Manifest, RunError, log, wake::Signals};
+use gyre_contract::{run::LinkConfig, topic};
 use gyre_journal::{self as journal, Journal};
-use gyre_stage::{Manifest, StageError, launch, wake::Signals};
 use gyre_supervise::rig::Rig;
 use zenoh::{Session, Wait};
 
@@ -40,7 +39,7 @@ pub struct RemoteRun {
 }
 
 /// Waits for the sender. `None` on a request to stop.
-pub fn ask(link: &LinkConfig, signals: &Signals) -> Result<Option<RemoteRun>, StageError> {
+pub fn ask(link: &LinkConfig, signals: &Signals) -> Result<Option<RemoteRun>, RunError> {
     let Some(session) = session::open(link, || signals.sleep(PAUSE))? else {
         return Ok(None);
     };
@@ -56,7 +55,7 @@ pub fn ask(link: &LinkConfig, signals: &Signals) -> Result<Option<RemoteRun>, St
     }
 }
 
-fn require_same(offered: &OfferedTopic) -> Result<(), StageError> {
+fn require_same(offered: &OfferedTopic) -> Result<(), RunError> {
     let ours = topic(&offered.name).map(|topic| topic.header.name);
     match ours == Some(&*offered.version) {
         true => Ok(()),
@@ -89,15 +88,15 @@ pub fn receive(
     gyre: String,
     remote: RemoteRun,
     signals: &Signals,
-) -> Result<Received, StageError> {
+) -> Result<Received, RunError> {
     let manifest = remote.manifest(out);
-    let journal = Journal::open(&journal::path(&manifest.out)).map_err(StageError::input)?;
+    let journal = Journal::open(&journal::path(&manifest.out)).map_err(RunError::input)?;
     let next_pose = next_pose(&journal, &remote.offer, out)?;
     let guardian = [gyre, "guard".to_owned()];
     let rig = Rig::new(manifest, &remote.offer.configuration, &guardian, signals);
-    let mut rig = rig.map_err(StageError::input)?;
-    rig.create_services().map_err(StageError::input)?;
-    let _log = launch::start_log(rig.manifest(), NAME)?;
+    let mut rig = rig.map_err(RunError::input)?;
+    rig.create_services().map_err(RunError::input)?;
+    let _log = log::start_log(rig.manifest(), NAME)?;
     let RemoteRun { session, offer } = remote;
     let mut mirror = Mirror {
         session: session.clone(),
@@ -127,29 +126,27 @@ pub fn receive(
 
 /// Returns the identity of this receiver, the same after a restart: the name of the first session
 /// that has written to the folder.
-fn receiver(out: &Path, session: &Session) -> Result<String, StageError> {
+fn receiver(out: &Path, session: &Session) -> Result<String, RunError> {
     let path = out.join("journal/receiver");
     match fs::read_to_string(&path) {
         Ok(name) if !name.is_empty() && name.chars().all(|c| c.is_ascii_hexdigit()) => Ok(name),
-        Err(source) if source.kind() != ErrorKind::NotFound => {
-            Err(StageError::File { path, source })
-        }
+        Err(source) if source.kind() != ErrorKind::NotFound => Err(RunError::File { path, source }),
         _ => {
             let name = session.zid().to_string();
-            fs::write(&path, &name).map_err(|source| StageError::File { path, source })?;
+            fs::write(&path, &name).map_err(|source| RunError::File { path, source })?;
             Ok(name)
         }
     }
 }
 
-fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, StageError> {
-    let (last, ended) = journal.last(1).map_err(StageError::input)?;
+fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, RunError> {
+    let (last, ended) = journal.last(1).map_err(RunError::input)?;
     let Some(last) = last.first() else {
         return Ok(0);
     };
     match began_ns(out)? == offer.began_ns && !ended {
         true => Ok(last.item.seq.saturating_add(1)),
-        false => Err(StageError::Input(format!(
+        false => Err(RunError::Input(format!(
             "{} has the poses of a different drive: choose another folder",
             out.display()
         ))),

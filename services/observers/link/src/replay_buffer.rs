@@ -7,9 +7,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::{RecordedMessage, RunError};
 use gyre_contract::{Hop, MotionHeader, PoseHeader, StageId, flag};
 use gyre_journal::{self as journal, loops::LoggedLoops};
-use gyre_stage::{StageError, source::RecordedMessage};
 
 /// A message on its way: the bytes of its header, then the bytes of its payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,11 +61,11 @@ pub(crate) enum Next {
 
 pub(crate) trait ReplayBuffer: Send + Sync {
     /// Returns the first message from a place on, and waits for it at most `limit`.
-    fn next(&self, place: Place, limit: Duration) -> Result<Next, StageError>;
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, RunError>;
 
     fn add(&self, message: &RecordedMessage);
 
-    fn end(&self) -> Result<(), StageError>;
+    fn end(&self) -> Result<(), RunError>;
 }
 
 pub(crate) struct MemoryBuffer {
@@ -99,7 +99,7 @@ impl MemoryBuffer {
 }
 
 impl ReplayBuffer for MemoryBuffer {
-    fn next(&self, place: Place, limit: Duration) -> Result<Next, StageError> {
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, RunError> {
         let first = |held: &Held| {
             let has = |message: &Message| place.is_behind(message);
             let at = held.messages.partition_point(has);
@@ -131,7 +131,7 @@ impl ReplayBuffer for MemoryBuffer {
         self.changed.notify_all();
     }
 
-    fn end(&self) -> Result<(), StageError> {
+    fn end(&self) -> Result<(), RunError> {
         lock(&self.held).has_ended = true;
         self.changed.notify_all();
         Ok(())
@@ -146,7 +146,7 @@ pub(crate) struct LogBuffer {
 }
 
 /// Returns the header of a message in a log by its number, if it is there.
-type ReadLog = Box<dyn FnMut(u64) -> Result<Option<Vec<u8>>, StageError> + Send>;
+type ReadLog = Box<dyn FnMut(u64) -> Result<Option<Vec<u8>>, RunError> + Send>;
 
 #[derive(Clone, Copy, Default)]
 struct Published {
@@ -166,11 +166,11 @@ impl LogBuffer {
     pub fn of_poses(out: &Path) -> Self {
         let path = journal::path(out);
         Self::of(Box::new(move |seq| {
-            let Some(mut records) = journal::records_from(&path, seq).map_err(StageError::input)?
+            let Some(mut records) = journal::records_from(&path, seq).map_err(RunError::input)?
             else {
                 return Ok(None);
             };
-            let pose = records.next().transpose().map_err(StageError::input)?;
+            let pose = records.next().transpose().map_err(RunError::input)?;
             let pose = pose.filter(|pose| !pose.item.is(flag::END));
             Ok(pose.map(|pose| bytemuck::bytes_of(&pose).to_vec()))
         }))
@@ -189,13 +189,13 @@ impl LogBuffer {
         self.changed.notify_all();
     }
 
-    fn read(&self, seq: u64) -> Result<Option<Vec<u8>>, StageError> {
+    fn read(&self, seq: u64) -> Result<Option<Vec<u8>>, RunError> {
         (lock(&self.read))(seq)
     }
 }
 
 impl ReplayBuffer for LogBuffer {
-    fn next(&self, place: Place, limit: Duration) -> Result<Next, StageError> {
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, RunError> {
         let seq = place.seq;
         let is_decided =
             |it: &Published| (seq < it.messages || it.has_ended).then_some(it.messages);
@@ -220,7 +220,7 @@ impl ReplayBuffer for LogBuffer {
         self.set_published(message.item().map_or(0, |item| item.seq.saturating_add(1)));
     }
 
-    fn end(&self) -> Result<(), StageError> {
+    fn end(&self) -> Result<(), RunError> {
         let mut messages = lock(&self.published).messages;
         while self.read(messages)?.is_some() {
             messages += 1;
@@ -239,7 +239,7 @@ impl ReplayBuffer for LogBuffer {
 pub(crate) struct MotionBuffer(pub Arc<LogBuffer>);
 
 impl ReplayBuffer for MotionBuffer {
-    fn next(&self, place: Place, limit: Duration) -> Result<Next, StageError> {
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, RunError> {
         let mut next = self.0.next(place, limit)?;
         if let Next::Message(message) = &mut next {
             let PoseHeader { item, motion, .. } = bytemuck::pod_read_unaligned(&message.bytes);
@@ -252,7 +252,7 @@ impl ReplayBuffer for MotionBuffer {
 
     fn add(&self, _: &RecordedMessage) {}
 
-    fn end(&self) -> Result<(), StageError> {
+    fn end(&self) -> Result<(), RunError> {
         Ok(())
     }
 }

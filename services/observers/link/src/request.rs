@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_stage::StageError;
+use gyre_client::RunError;
 use serde::{Serialize, de::DeserializeOwned};
 use zenoh::{
     Session, Wait,
@@ -27,7 +27,7 @@ impl Question {
         session: &Session,
         key: String,
         payload: impl Into<ZBytes>,
-    ) -> Result<Option<A>, StageError> {
+    ) -> Result<Option<A>, RunError> {
         let asked = session.get(key).payload(payload).timeout(ANSWER_TIMEOUT);
         let answers = asked.wait().map_err(|e| failed(self.0, &e))?;
         let answer = answers.recv().ok().map(Reply::into_result);
@@ -45,7 +45,7 @@ pub(crate) fn answer<A: Serialize>(
     key: String,
     action: &str,
     answer: impl Fn() -> A + Send + Sync + 'static,
-) -> Result<Queryable<()>, StageError> {
+) -> Result<Queryable<()>, RunError> {
     let reply_key = key.clone();
     session
         .declare_queryable(key)

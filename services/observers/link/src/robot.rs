@@ -7,12 +7,13 @@
 use std::{collections::VecDeque, sync::Arc, thread};
 
 use bytemuck::Pod;
-use gyre_contract::run::{LinkConfig, PlayedFrom, Side};
+use gyre_client::{RunError, clock};
 use gyre_contract::{
     Hop, Item, Masked, Message as _, Motion, MotionHeader, Pose, PoseHeader, StageId, flag,
+    run::{LinkConfig, PlayedFrom, Side, StageCounters},
 };
 use gyre_journal::{self as journal, Journal};
-use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
+use gyre_stage::{Launch, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
@@ -26,10 +27,10 @@ use crate::{
     waker::Waker,
 };
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
-    let journal = Journal::open(&journal::path(&launch.manifest.out)).map_err(StageError::input)?;
+    let journal = Journal::open(&journal::path(&launch.manifest.out)).map_err(RunError::input)?;
     let mut stages = LastStages::open(launch, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || stages.sleep(waker.descriptor());
@@ -71,7 +72,7 @@ struct SentTopic {
 }
 
 impl Robot<'_> {
-    fn work(&mut self) -> Result<(), StageError> {
+    fn work(&mut self) -> Result<(), RunError> {
         let bytes = self.launch.manifest.limits.scan_bytes;
         let key = handshake::scan_size_key(&self.config);
         let _scan_size = request::answer(
@@ -103,14 +104,14 @@ impl Robot<'_> {
     }
 
     /// Returns the newest poses of the journal, to be published again, and whether it has ended.
-    fn last_poses(&self) -> Result<(Vec<PoseHeader>, bool), StageError> {
+    fn last_poses(&self) -> Result<(Vec<PoseHeader>, bool), RunError> {
         let poses = self.journal.last(self.stages.history().max(1));
-        poses.map_err(StageError::input)
+        poses.map_err(RunError::input)
     }
 
     /// Asks the base where to continue until it answers; returns the number of items that have
     /// poses or will. `None` on a request to stop.
-    fn begin(&mut self) -> Result<Option<u64>, StageError> {
+    fn begin(&mut self) -> Result<Option<u64>, RunError> {
         let topics = self.topics();
         let agreement = Agreement::of(&self.launch.manifest, &self.config, &topics);
         let mut logged = String::new();
@@ -120,7 +121,7 @@ impl Robot<'_> {
                     let received = newest.map_or(0, |newest| newest + 1);
                     return self.check_start(received).map(|()| Some(received));
                 }
-                Some(StartAnswer::Refused(why)) => return Err(StageError::Input(why)),
+                Some(StartAnswer::Refused(why)) => return Err(RunError::Input(why)),
                 Some(StartAnswer::Wait(why)) => why,
                 None => "the base does not answer yet".to_owned(),
             };
@@ -134,16 +135,16 @@ impl Robot<'_> {
         }
     }
 
-    fn check_start(&self, received: u64) -> Result<(), StageError> {
+    fn check_start(&self, received: u64) -> Result<(), RunError> {
         let (poses, base) = (self.next_pose, received);
         let window = self.launch.manifest.window.scans as u64;
         match self.config.cut {
-            _ if base < poses => Err(StageError::Input(format!(
+            _ if base < poses => Err(RunError::Input(format!(
                 "this run has {poses} poses, but the base begins at {base}: start both again with --fresh, or continue with the base's --out of this run"
             ))),
             // The local map is here, and cannot be restored from poses.
             PlayedFrom::Refined if base > poses.saturating_add(window) => {
-                Err(StageError::Input(format!(
+                Err(RunError::Input(format!(
                     "the base has {base} poses and this run {poses}, and the local map of the refinement, which is here, cannot be made up: start both again with --fresh"
                 )))
             }
@@ -152,7 +153,7 @@ impl Robot<'_> {
     }
 
     /// Journals the poses of all items of an earlier start; false on a request to stop.
-    fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, StageError> {
+    fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, RunError> {
         while self.next_pose < received {
             self.waker.clear();
             while let Some(bytes) = poses.next() {
@@ -166,7 +167,7 @@ impl Robot<'_> {
     }
 
     /// Sends the messages of the stages here, and publishes those that come back, until SIGTERM.
-    fn relay(&mut self, poses: &Fetcher) -> Result<(), StageError> {
+    fn relay(&mut self, poses: &Fetcher) -> Result<(), RunError> {
         let topics = self.topics();
         self.stages.read(&topics)?;
         let prefix = handshake::prefix(&self.config, Side::Robot);
@@ -177,7 +178,7 @@ impl Robot<'_> {
             let offer = server.offer(topic, buffer.clone())?;
             Ok(SentTopic { buffer, offer })
         });
-        let sent = sent.collect::<Result<Vec<_>, StageError>>()?;
+        let sent = sent.collect::<Result<Vec<_>, RunError>>()?;
         let returns_motions = self.config.returns_motions();
         let motions = returns_motions.then(|| self.fetch(Motion::TOPIC));
         let (mut end, mut has_ended) = (None, false);
@@ -216,7 +217,7 @@ impl Robot<'_> {
         sent: &SentTopic,
         topics: usize,
         depth: usize,
-    ) -> Result<Option<Item>, StageError> {
+    ) -> Result<Option<Item>, RunError> {
         let mut end = None;
         while let Some(message) = self.stages.receive(place)? {
             let item = message.item().unwrap_or_default();
@@ -234,17 +235,17 @@ impl Robot<'_> {
     }
 
     /// Journals a pose; `None` if it was there already.
-    fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, StageError> {
+    fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, RunError> {
         let mut pose = self.checked::<Pose, PoseHeader>(bytes)?;
         let (expected, got) = (self.next_pose, pose.item.seq);
         if got < expected || pose.item.is(flag::END) {
             return Ok(None);
         }
         if got > expected {
-            return Err(StageError::gap(Pose::TOPIC, expected, got));
+            return Err(RunError::gap(Pose::TOPIC, expected, got));
         }
         pose.item = self.timed(pose.item);
-        self.journal.append(&pose).map_err(StageError::input)?;
+        self.journal.append(&pose).map_err(RunError::input)?;
         self.next_pose = got.saturating_add(1);
         Ok(Some(pose))
     }
@@ -272,7 +273,7 @@ impl Robot<'_> {
     }
 
     /// Ends this side once the base requests what follows the end; false before.
-    fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, StageError> {
+    fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, RunError> {
         // The base ends when it knows that all poses are here, and that this side knows of its end.
         poses.confirm(self.next_pose);
         let has_end = |sent: &SentTopic| sent.offer.answered() > end.seq;
@@ -284,9 +285,7 @@ impl Robot<'_> {
             item: Item { flags, ..*end },
             ..PoseHeader::default()
         };
-        self.journal
-            .append(&end_record)
-            .map_err(StageError::input)?;
+        self.journal.append(&end_record).map_err(RunError::input)?;
         self.stages.end(*end)?;
         Ok(true)
     }
@@ -312,8 +311,8 @@ impl Robot<'_> {
     fn checked<M: gyre_contract::Message<Header = H>, H: Pod>(
         &self,
         bytes: &[u8],
-    ) -> Result<H, StageError> {
-        let malformed = |reason: String| StageError::Malformed {
+    ) -> Result<H, RunError> {
+        let malformed = |reason: String| RunError::Malformed {
             topic: M::TOPIC,
             sender: "the base",
             seq: 0,
@@ -326,7 +325,7 @@ impl Robot<'_> {
         Ok(header)
     }
 
-    fn sleep(&mut self) -> Result<bool, StageError> {
+    fn sleep(&mut self) -> Result<bool, RunError> {
         self.stages.sleep(self.waker.descriptor())
     }
 }

@@ -14,16 +14,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_contract::run::LinkConfig;
-use gyre_contract::{
-    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Window, topic,
-};
-use gyre_journal::{self as journal, loops::LoggedLoops};
-use gyre_stage::{
-    Manifest, StageError, launch,
+use gyre_client::{
+    Manifest, RunError, log,
     observer::{ObservedRun, TopicObserver, wait_for_any},
     wake::{MAX_WAIT, Signals},
 };
+use gyre_contract::{
+    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Window, run::LinkConfig, topic,
+};
+use gyre_journal::{self as journal, loops::LoggedLoops};
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait, query::Queryable};
 
@@ -95,11 +94,11 @@ pub(crate) fn offer_key(name: &str) -> String {
 }
 
 /// Returns the time of the first pose in a folder, ns since 1970.
-pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, StageError> {
-    let records = journal::records(&journal::path(out)).map_err(StageError::input)?;
+pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, RunError> {
+    let records = journal::records(&journal::path(out)).map_err(RunError::input)?;
     let first = records.into_iter().flatten().next().transpose();
     Ok(first
-        .map_err(StageError::input)?
+        .map_err(RunError::input)?
         .map(|pose| pose.item.stamp_ns))
 }
 
@@ -110,10 +109,10 @@ pub fn send(
     link: &LinkConfig,
     topics: &[String],
     linger: Duration,
-) -> Result<Sent, StageError> {
+) -> Result<Sent, RunError> {
     check(link)?;
     let run = ObservedRun::writing_to(out)?;
-    let _log = launch::start_log(run.manifest(), NAME)?;
+    let _log = log::start_log(run.manifest(), NAME)?;
     let signals = Signals::install()?;
     let pause = || signals.sleep(MAX_WAIT);
     let Some(session) = session::open(link, pause)? else {
@@ -144,7 +143,7 @@ impl<'run> Sending<'run> {
         link: &str,
         named: &[String],
         session: &Session,
-    ) -> Result<Self, StageError> {
+    ) -> Result<Self, RunError> {
         let manifest = run.manifest();
         let prefix = prefix(link, &session.zid().to_string());
         let mut server = Server::new(session, &prefix, None);
@@ -159,7 +158,7 @@ impl<'run> Sending<'run> {
                 buffer,
             })
         });
-        let topics = topics.collect::<Result<Vec<_>, StageError>>()?;
+        let topics = topics.collect::<Result<Vec<_>, RunError>>()?;
         Ok(Self {
             run,
             topics,
@@ -168,7 +167,7 @@ impl<'run> Sending<'run> {
         })
     }
 
-    fn run(mut self, signals: &Signals, linger: Duration) -> Result<Sent, StageError> {
+    fn run(mut self, signals: &Signals, linger: Duration) -> Result<Sent, RunError> {
         let mut ended: Option<Instant> = None;
         loop {
             // Before the queues are read: messages from before the end are still in them.
@@ -217,13 +216,13 @@ impl<'run> Sending<'run> {
 }
 
 impl SentTopic<'_> {
-    fn take(&mut self) -> Result<(), StageError> {
+    fn take(&mut self) -> Result<(), RunError> {
         loop {
             match self.observer.take() {
                 Ok(Some(message)) => self.buffer.add(&message),
                 Ok(None) => return Ok(()),
                 // The run judges the messages of its stages. The message counts as missed.
-                Err(StageError::Malformed { .. }) => {}
+                Err(RunError::Malformed { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
@@ -235,7 +234,7 @@ fn buffer(
     name: &str,
     manifest: &Manifest,
     poses: &Arc<LogBuffer>,
-) -> Result<Arc<dyn ReplayBuffer>, StageError> {
+) -> Result<Arc<dyn ReplayBuffer>, RunError> {
     let composed = match manifest.refines {
         true => Refined::TOPIC,
         false => Motion::TOPIC,
@@ -259,7 +258,7 @@ pub(crate) fn is_lossless(topic: &str) -> bool {
 }
 
 /// Returns the topics to send; poses are among them, since the motions come with them.
-fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, StageError> {
+fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, RunError> {
     let named: Vec<&str> = match named.is_empty() {
         true => DEFAULT
             .into_iter()
@@ -277,8 +276,8 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, St
     Ok(topics)
 }
 
-fn no_topic(name: &str) -> StageError {
-    StageError::Input(format!(
+fn no_topic(name: &str) -> RunError {
+    RunError::Input(format!(
         "there is no topic `{name}`: there are scan, masked, rotation, motion, refined, pose, loop, correction and fix"
     ))
 }
@@ -288,7 +287,7 @@ fn offer(
     link: &str,
     manifest: &Manifest,
     names: &[&'static str],
-) -> Result<Queryable<()>, StageError> {
+) -> Result<Queryable<()>, RunError> {
     let path = manifest.root.join("config.toml");
     let offered = |name: &&'static str| OfferedTopic {
         name: (*name).to_owned(),
@@ -301,7 +300,7 @@ fn offer(
         refines: manifest.refines,
         rate: manifest.rate,
         configuration: fs::read_to_string(&path)
-            .map_err(|source| StageError::File { path, source })?,
+            .map_err(|source| RunError::File { path, source })?,
         sender: session.zid().to_string(),
         began_ns: None,
         topics: names.iter().map(offered).collect(),

@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::StageError;
+use gyre_client::RunError;
 use zenoh::{
     Session, Wait,
     query::{Query, Queryable},
@@ -85,7 +85,7 @@ impl Server {
         &mut self,
         topic: &str,
         buffer: Arc<dyn ReplayBuffer>,
-    ) -> Result<Arc<Offer>, StageError> {
+    ) -> Result<Arc<Offer>, RunError> {
         let offer = Arc::new(Offer {
             buffer,
             key: format!("{}/{topic}", self.prefix),
@@ -175,7 +175,7 @@ impl Offer {
         mut place: Place,
         receiver: &str,
         request: u64,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         // The receiver learns at once that this end is there.
         self.reply(query, &[])?;
         self.answered.fetch_max(place.seq, Ordering::Relaxed);
@@ -208,7 +208,7 @@ impl Offer {
         Ok(())
     }
 
-    fn reply(&self, query: &Query, bytes: &[u8]) -> Result<(), StageError> {
+    fn reply(&self, query: &Query, bytes: &[u8]) -> Result<(), RunError> {
         let reply = query.reply(&self.key, bytes).express(true);
         reply.wait().map_err(|e| failed("send", &e))
     }

@@ -6,8 +6,8 @@ use std::{
     thread,
 };
 
+use gyre_client::RunError;
 use gyre_contract::run::LinkConfig;
-use gyre_stage::StageError;
 use serde_json::{Value, json};
 use zenoh::{Config, Session, Wait};
 
@@ -24,8 +24,8 @@ const MAX_BLOCKED_US: u64 = 900_000_000;
 /// `None` after one.
 pub(crate) fn open(
     link: &LinkConfig,
-    mut pause: impl FnMut() -> Result<bool, StageError>,
-) -> Result<Option<Session>, StageError> {
+    mut pause: impl FnMut() -> Result<bool, RunError>,
+) -> Result<Option<Session>, RunError> {
     check(link)?;
     let config = Config::from_json5(&settings(link).to_string())
         .map_err(|e| failed("use the settings of the link", &e))?;

@@ -12,9 +12,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_contract::run::LinkConfig;
-use gyre_contract::{Item, flag};
-use gyre_stage::source::RecordedMessage;
+use gyre_client::RecordedMessage;
+use gyre_contract::{Item, flag, run::LinkConfig};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{

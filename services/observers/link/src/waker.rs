@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use gyre_stage::StageError;
+use gyre_client::RunError;
 use rustix::{
     event::{EventfdFlags, eventfd},
     io::{read, write},
@@ -19,7 +19,7 @@ use crate::error::failed;
 pub(crate) struct Waker(Arc<OwnedFd>);
 
 impl Waker {
-    pub fn new() -> Result<Self, StageError> {
+    pub fn new() -> Result<Self, RunError> {
         let event = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK);
         let event = event.map_err(|e| failed("make an event", &e))?;
         Ok(Self(Arc::new(event)))

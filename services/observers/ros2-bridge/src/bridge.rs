@@ -2,8 +2,8 @@
 
 use std::thread;
 
+use gyre_client::{RunError, clock, wake::Signals};
 use gyre_ros2_messages::{diagnostic_msgs::DiagnosticArray, tf2_msgs::TFMessage};
-use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
     Settings,
@@ -30,7 +30,7 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    pub fn open(settings: Settings) -> Result<Self, StageError> {
+    pub fn open(settings: Settings) -> Result<Self, RunError> {
         let mut node = Node::new(&settings.domain, &settings.namespace, NODE)?;
         Ok(Self {
             topics: Topics {
@@ -61,7 +61,7 @@ impl Bridge {
     }
 
     /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
-    pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), StageError> {
+    pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), RunError> {
         let shared = &self.shared;
         let mounted = shared.vehicle.mounted(clock::since_1970_ns());
         self.mounting.send(mounted);

@@ -2,14 +2,14 @@
 
 use std::thread;
 
+use gyre_client::{
+    Manifest, RunError,
+    observer::{Next, ObservedRun},
+};
 use gyre_contract::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader};
 use gyre_ros2_messages::{
     nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
     visualization_msgs::MarkerArray,
-};
-use gyre_stage::{
-    Manifest, StageError,
-    observer::{Next, ObservedRun},
 };
 
 use crate::{
@@ -99,7 +99,7 @@ fn follow_run(shared: &Shared, manifest: &Manifest, topics: &mut Topics, say: fn
 fn until_end(
     shared: &Shared,
     name: &str,
-    mut follow: impl FnMut(&ObservedRun) -> Result<(), StageError>,
+    mut follow: impl FnMut(&ObservedRun) -> Result<(), RunError>,
 ) {
     while !shared.is_stopping() {
         let followed = match ObservedRun::writing_to(&shared.out) {
@@ -108,7 +108,7 @@ fn until_end(
             Err(error) => Err(error),
         };
         match followed {
-            Ok(()) | Err(StageError::NotRunning { .. }) => return,
+            Ok(()) | Err(RunError::NotRunning { .. }) => return,
             Err(error) => {
                 shared.state().notice = Some(error.to_string());
                 thread::sleep(POLL_INTERVAL);
@@ -128,7 +128,7 @@ fn follow_poses(
     run: &ObservedRun,
     topics: &mut PoseTopics,
     say: fn(&str),
-) -> Result<(), StageError> {
+) -> Result<(), RunError> {
     shared.state().notice = None;
     each_message::<Pose>(shared, run, |pose| topics.publish(shared, pose, say))?;
     shared.state().phase = RunPhase::Finishing;
@@ -150,7 +150,7 @@ fn each_message<M: Message>(
     shared: &Shared,
     run: &ObservedRun,
     mut take: impl FnMut(&M::Header),
-) -> Result<(), StageError> {
+) -> Result<(), RunError> {
     let mut observer = run.observe::<M>()?;
     while !shared.is_stopping() {
         match observer.next(POLL_INTERVAL)? {

@@ -2,13 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use gyre_client::{clock, control::Control};
+use gyre_contract::control::{Activity, ProcessStatus, Status};
 use gyre_ros2_messages::{
     builtin_interfaces::Time,
     diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, STALE, WARN},
-};
-use gyre_stage::{
-    clock,
-    control::{Activity, Control, ProcessStatus, Status},
 };
 
 use crate::{
@@ -145,7 +143,7 @@ fn value(key: &str, value: impl ToString) -> KeyValue {
 
 #[cfg(test)]
 mod tests {
-    use gyre_stage::control::Phase;
+    use gyre_contract::control::Phase;
 
     use super::*;
 

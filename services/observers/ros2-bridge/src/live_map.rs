@@ -6,11 +6,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::{clock, observer::ObservedRun};
 use gyre_geometry::Pose;
 use gyre_ros2_messages::{frames::occupancy_grid, nav_msgs::OccupancyGrid};
-use gyre_slam::mapping::{Evidence, grid};
-use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator};
-use gyre_stage::{clock, observer::ObservedRun};
+use gyre_slam::{
+    Keyframe, Query, RecordReader, TrajectoryEstimator,
+    mapping::{Evidence, grid},
+};
 
 use crate::{
     MapSettings, MapSettingsOf,

@@ -2,8 +2,8 @@
 
 use std::{error::Error, fmt::Display, net::IpAddr, time::Duration};
 
+use gyre_client::RunError;
 use gyre_ros2_messages::{Domain, Ros2Message};
-use gyre_stage::StageError;
 use ros2_client::{
     Context, MessageTypeName, Name, NodeName, NodeOptions, QosProfile, Subscription,
     dds::rustdds::DomainParticipantBuilder,
@@ -45,22 +45,22 @@ impl Keep {
 }
 
 impl Node {
-    pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, StageError> {
+    pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, RunError> {
         let node_name = NodeName::new(namespace, name)
             .map_err(|reason| name_error(&format!("{namespace} {name}"), &reason))?;
         let joined = join(domain, node_name);
         joined.map_err(|reason| {
             let domain = domain.id;
-            StageError::Input(format!("cannot join domain {domain} of ROS 2: {reason}"))
+            RunError::Input(format!("cannot join domain {domain} of ROS 2: {reason}"))
         })
     }
 
-    pub fn dds_name(&self, topic: &str) -> Result<String, StageError> {
+    pub fn dds_name(&self, topic: &str) -> Result<String, RunError> {
         Ok(format!("rt{}", self.absolute(topic)?))
     }
 
     /// Returns the absolute name of a topic: the library makes `//` of one in the root.
-    fn absolute(&self, topic: &str) -> Result<Name, StageError> {
+    fn absolute(&self, topic: &str) -> Result<Name, RunError> {
         let name = name(topic)?;
         match name.is_absolute() {
             true => Ok(name),
@@ -75,7 +75,7 @@ impl Node {
         &mut self,
         topic: &str,
         keep: Keep,
-    ) -> Result<Outlet<M>, StageError> {
+    ) -> Result<Outlet<M>, RunError> {
         let opened = self.open::<M>(topic, &keep.qos())?;
         let publisher = self.node.create_publisher(&opened, None);
         publisher
@@ -90,7 +90,7 @@ impl Node {
         topic: &str,
         depth: usize,
         is_lossy: bool,
-    ) -> Result<Subscription<M>, StageError> {
+    ) -> Result<Subscription<M>, RunError> {
         let qos = match is_lossy {
             true => Keep::Last(depth).qos().reliability(Reliability::BestEffort),
             false => Keep::Last(depth).qos(),
@@ -113,7 +113,7 @@ impl Node {
         &self,
         topic: &str,
         qos: &QosProfile,
-    ) -> Result<ros2_client::dds::rustdds::Topic, StageError> {
+    ) -> Result<ros2_client::dds::rustdds::Topic, RunError> {
         let definition = M::DEFINITION;
         let message = MessageTypeName::new(definition.package, definition.name);
         let opened = self.node.create_topic(&self.absolute(topic)?, message, qos);
@@ -134,16 +134,16 @@ fn join(domain: &Domain, name: NodeName) -> Result<Node, Box<dyn Error>> {
     Ok(Node { node, context })
 }
 
-fn name(topic: &str) -> Result<Name, StageError> {
+fn name(topic: &str) -> Result<Name, RunError> {
     Name::parse(topic).map_err(|reason| name_error(topic, &reason))
 }
 
-fn name_error(name: &str, reason: &dyn Display) -> StageError {
-    StageError::Input(format!(
+fn name_error(name: &str, reason: &dyn Display) -> RunError {
+    RunError::Input(format!(
         "`{name}` is no name of ROS 2: {reason}; names are letters, digits and single `_`, between single `/`"
     ))
 }
 
-fn topic_error(topic: &str, reason: &dyn Display) -> StageError {
-    StageError::Input(format!("cannot open the topic {topic} of ROS 2: {reason}"))
+fn topic_error(topic: &str, reason: &dyn Display) -> RunError {
+    RunError::Input(format!("cannot open the topic {topic} of ROS 2: {reason}"))
 }

@@ -9,9 +9,9 @@ use std::{
     time::Duration,
 };
 
+use gyre_client::clock;
 use gyre_geometry::Pose;
 use gyre_ros2_messages::Vehicle;
-use gyre_stage::clock;
 
 use crate::clock::offset_ns;
 

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_ros2_messages::{Domain, Vehicle};
-use gyre_slam::EstimatorKind;
-use gyre_slam::mapping::MapOptions;
+use gyre_slam::{EstimatorKind, mapping::MapOptions};
 
 #[derive(Clone, Debug)]
 pub struct Settings {

@@ -10,13 +10,14 @@ mod wakeups;
 
 use std::time::Duration;
 
-use gyre_contract::run::SourceConfig;
+use gyre_client::RunError;
+use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::samples::{
     GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind,
 };
 use gyre_ros2_messages::Domain;
-use gyre_stage::{Launch, StageCounters, StageError, source};
+use gyre_stage::{Launch, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
 
 pub use ask::ask;
@@ -71,7 +72,7 @@ impl Settings {
     }
 }
 
-pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, RunError> {
     let gyro: GyroConfig = launch.section("gyro")?;
     let topic = gyro.topic.unwrap_or_else(|| IMU.to_owned());
     settings.gyro_topic = (gyro.kind == GyroKind::Ros2).then_some(topic);

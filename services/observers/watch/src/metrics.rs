@@ -149,8 +149,9 @@ impl Snapshot {
 
 #[cfg(test)]
 mod tests {
-    use gyre_contract::{Hop, Item, PoseHeader, StageId, flag, gyro, outcome, wheels};
-    use gyre_stage::source::Received;
+    use gyre_contract::{
+        Hop, Item, PoseHeader, StageId, control::Received, flag, gyro, outcome, wheels,
+    };
 
     use super::*;
 

@@ -8,12 +8,11 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws};
-use gyre_contract::{Masked, Message, Objects, Pose, PoseHeader, Scan};
-use gyre_stage::{
-    StageError,
+use gyre_client::{
+    Received, RunError,
     observer::{Next, ObservedRun},
-    reader::Received,
 };
+use gyre_contract::{Masked, Message, Objects, Pose, PoseHeader, Scan};
 
 use crate::{
     journal_track::JournalTrack,
@@ -83,7 +82,7 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
                     thread::sleep(POLL_INTERVAL);
                 }
             }
-            Err(StageError::NotRunning { .. }) => {}
+            Err(RunError::NotRunning { .. }) => {}
             Err(error) => {
                 view.set_notice(Some(format!("Poses are not shown: {error}.")));
                 thread::sleep(POLL_INTERVAL);
@@ -102,7 +101,7 @@ fn follow_poses(
     followed: &Followed,
     run: &ObservedRun,
     track: &mut JournalTrack,
-) -> Result<(), StageError> {
+) -> Result<(), RunError> {
     let view = &followed.view;
     let mut poses = run.observe::<Pose>()?;
     // Without a place for it the rates are missing, and nothing else.
@@ -171,7 +170,7 @@ pub fn follow_topic<M: Message>(
     followed: &Followed,
     is_wanted: &dyn Fn() -> bool,
     mut take: impl FnMut(&Received<M>, u64),
-) -> Result<(), StageError> {
+) -> Result<(), RunError> {
     thread::sleep(POLL_INTERVAL);
     if !is_wanted() || followed.view.run().state != RunState::Working {
         return Ok(());
@@ -188,7 +187,7 @@ pub fn follow_topic<M: Message>(
         Ok(())
     });
     match followed {
-        Err(StageError::NotRunning { .. }) => Ok(()),
+        Err(RunError::NotRunning { .. }) => Ok(()),
         followed => followed,
     }
 }

@@ -2,11 +2,8 @@
 
 use std::{collections::BTreeMap, mem, path::Path, time::Instant};
 
-use gyre_stage::{
-    control::{Activity, Control, Status},
-    source::Received,
-};
-use gyre_supervise::Usage;
+use gyre_client::{Usage, control::Control};
+use gyre_contract::control::{Activity, Received, Status};
 use serde::Serialize;
 
 const SUPERVISOR: &str = "supervisor";

@@ -3,7 +3,7 @@
 //! One thread takes messages from the observers' queues and copies them, and a second thread
 //! compresses and writes. Between them is a queue with a limit in bytes. So a slow disk costs
 //! memory first, and then messages, which are counted. Nothing that the recorder does reaches the
-//! run: see [`gyre_stage::observer`].
+//! run: see [`gyre_client::observer`].
 
 mod begin;
 mod health;

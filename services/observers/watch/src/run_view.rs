@@ -6,11 +6,11 @@ use std::{
 };
 
 use axum::extract::ws::Message;
+use gyre_client::{Manifest, clock};
 use gyre_contract::{
     Message as _, Objects, ObjectsHeader, Pose, PoseHeader, SampleRates, Scan, ScanHeader,
-    WitnessCounts, flag,
+    WitnessCounts, control::Status, flag,
 };
-use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
 use serde_json::json;
 use tokio::sync::watch;

@@ -1,27 +1,30 @@
 //! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
 //! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map.
 
-use gyre_contract::{Fix, FixHeader, Item, fix_status};
+use gyre_contract::{Fix, FixHeader, Item, fix_status, run::StageCounters};
 use gyre_geometry::{covariance, xy_yaw};
 use gyre_matching::RefinementConfig;
 use gyre_radar::points::PointsConfig;
-use gyre_slam::localisation::{Localisation, Localiser, Map, Observation, Status};
-use gyre_slam::{Keyframe, RecordReader, SlamConfig};
-use gyre_stage::{
-    Follower, Launch, StageCounters, StageError,
-    follower::{self, LogId, Progress, Step},
+use gyre_slam::{
+    Keyframe, RecordReader, SlamConfig,
+    localisation::{Localisation, Localiser, Map, Observation, Status},
 };
+use gyre_stage::{
+    Follower, Launch,
+    follower::{self, Progress, Step},
+};
+use gyre_transport::{RunError, services::LogId};
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;
     let points: PointsConfig = launch.section("points")?;
-    let map = Map::open(&slam.map).map_err(StageError::input)?;
+    let map = Map::open(&slam.map).map_err(RunError::input)?;
     let localiser = Localiser::new(map, &refinement, points.capacity);
     launch.take_place()?;
     let mut places = Fixes {
         keyframes: RecordReader::open(&launch.manifest.out)?,
-        localiser: localiser.map_err(StageError::input)?,
+        localiser: localiser.map_err(RunError::input)?,
         read: 0,
     };
     follower::run(launch, &mut places)
@@ -36,7 +39,7 @@ struct Fixes {
 impl Fixes {
     /// Looks for new keyframes. If some of the keyframes that were read have been cut off, it
     /// restarts from the first keyframe.
-    fn look(&mut self) -> Result<(), StageError> {
+    fn look(&mut self) -> Result<(), RunError> {
         self.keyframes.refresh()?;
         if self.keyframes.unchanged() < self.read {
             self.localiser.reset();
@@ -45,7 +48,7 @@ impl Fixes {
         Ok(())
     }
 
-    fn locate_next(&mut self) -> Result<FixHeader, StageError> {
+    fn locate_next(&mut self) -> Result<FixHeader, RunError> {
         let keyframe = self.keyframes.read(self.read)?;
         let found = self.localiser.locate(&Observation {
             stamp_ns: keyframe.stamp_ns,
@@ -63,7 +66,7 @@ impl Follower for Fixes {
     type Output = Fix;
     const LOGS: &'static [LogId] = &[LogId::Keyframes];
 
-    fn step(&mut self) -> Result<Step<FixHeader>, StageError> {
+    fn step(&mut self) -> Result<Step<FixHeader>, RunError> {
         self.look()?;
         if self.read < self.keyframes.len() {
             return Ok(Step::Worked(Some(self.locate_next()?)));

@@ -4,20 +4,21 @@
 
 use std::collections::VecDeque;
 
-use gyre_contract::{Loop, LoopHeader};
+use gyre_contract::{Loop, LoopHeader, run::StageCounters};
 use gyre_journal::loops::loops_of;
 use gyre_matching::RefinementConfig;
 use gyre_radar::points::PointsConfig;
-use gyre_slam::estimation::places::{MAX_NEIGHBOURS, neighbours};
 use gyre_slam::{
     ClosingError, Keyframe, LoopCloser, Place, Query, RecordLog, RecordReader, SlamConfig,
+    estimation::places::{MAX_NEIGHBOURS, neighbours},
 };
 use gyre_stage::{
-    Follower, Launch, StageCounters, StageError,
-    follower::{self, LogId, Notifier, Progress, Step},
+    Follower, Launch,
+    follower::{self, Progress, Step},
 };
+use gyre_transport::{RunError, services::LogId, transport::Notifier};
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let (slam, refinement, points): (SlamConfig, RefinementConfig, PointsConfig) = (
         launch.section("slam")?,
@@ -27,11 +28,11 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let submap_reach_m = slam.submap_reach_m;
     let new_closer = move || {
         let closer = LoopCloser::new(submap_reach_m, &refinement, points.capacity);
-        closer.map_err(StageError::input)
+        closer.map_err(RunError::input)
     };
     let out = &launch.manifest.out;
     let mut closing = LoopClosing {
-        growth: LogId::Loops.growth(launch)?,
+        growth: LogId::Loops.growth(&launch.node)?,
         keyframes: RecordReader::open(out)?,
         places: RecordLog::open(out)?,
         queries: RecordLog::open(out)?,
@@ -54,7 +55,7 @@ struct LoopClosing {
     places: RecordLog<Place>,
     queries: RecordLog<Query>,
     closer: LoopCloser,
-    new_closer: Box<dyn Fn() -> Result<LoopCloser, StageError>>,
+    new_closer: Box<dyn Fn() -> Result<LoopCloser, RunError>>,
     submap_reach_m: f64,
     loops: u64,
     pending: VecDeque<LoopHeader>,
@@ -65,7 +66,7 @@ impl Follower for LoopClosing {
     type Output = Loop;
     const LOGS: &'static [LogId] = &[LogId::Keyframes];
 
-    fn step(&mut self) -> Result<Step<LoopHeader>, StageError> {
+    fn step(&mut self) -> Result<Step<LoopHeader>, RunError> {
         if let Some(unchanged) = self.look()? {
             self.closer = (self.new_closer)()?;
             self.restore(Some(unchanged))?;
@@ -76,7 +77,7 @@ impl Follower for LoopClosing {
         let next = self.closer.keyframes();
         if next < self.keyframes.len() {
             let pushed = self.keyframes.read(next)?;
-            self.closer.push(&pushed).map_err(StageError::input)?;
+            self.closer.push(&pushed).map_err(RunError::input)?;
             return Ok(Step::Worked(None));
         }
         if self.keyframes.has_ended() && !self.has_finished {
@@ -86,7 +87,7 @@ impl Follower for LoopClosing {
         self.close()
     }
 
-    fn sync(&mut self) -> Result<(), StageError> {
+    fn sync(&mut self) -> Result<(), RunError> {
         self.places.sync()?;
         Ok(self.queries.sync()?)
     }
@@ -100,7 +101,7 @@ impl LoopClosing {
     /// Gives the places and queries that are there to a new closer, and cuts off those that
     /// keyframes which are no longer there have led to. `unchanged` is the number of keyframes that
     /// are as they were; `None`: none was cut off.
-    fn restore(&mut self, unchanged: Option<usize>) -> Result<(), StageError> {
+    fn restore(&mut self, unchanged: Option<usize>) -> Result<(), RunError> {
         let places = self.known_places(unchanged)?;
         if places < self.places.len() {
             self.places.cut(places)?;
@@ -112,7 +113,7 @@ impl LoopClosing {
         }
         for index in 0..places {
             let place = self.places.read(index)?;
-            let restored = self.closer.restore_place::<StageError>(&place);
+            let restored = self.closer.restore_place::<RunError>(&place);
             restored.map_err(failed)?;
         }
         (self.loops, self.has_finished) = (0, false);
@@ -128,7 +129,7 @@ impl LoopClosing {
     }
 
     /// Returns how many of the places follow from the keyframes that are there.
-    fn known_places(&mut self, unchanged: Option<usize>) -> Result<usize, StageError> {
+    fn known_places(&mut self, unchanged: Option<usize>) -> Result<usize, RunError> {
         let keyframes = unchanged.unwrap_or(usize::MAX).min(self.keyframes.len());
         let places = self.places.len().min(keyframes);
         if self.keyframes.has_ended() && unchanged.is_none() {
@@ -137,7 +138,7 @@ impl LoopClosing {
         // A place follows from the keyframes around it.
         let first = places.saturating_sub(MAX_NEIGHBOURS + 1);
         let path_m = |index| Ok(self.keyframes.read(index)?.path_m);
-        let path_m: Result<Vec<f64>, StageError> = (first..keyframes).map(path_m).collect();
+        let path_m: Result<Vec<f64>, RunError> = (first..keyframes).map(path_m).collect();
         let path_m = path_m?;
         let is_incomplete = |place: &usize| {
             first + neighbours(&path_m, place - first, self.submap_reach_m).end >= keyframes
@@ -147,7 +148,7 @@ impl LoopClosing {
 
     /// Looks for new keyframes. Returns the number of those that are as they were, if some have
     /// been cut off.
-    fn look(&mut self) -> Result<Option<usize>, StageError> {
+    fn look(&mut self) -> Result<Option<usize>, RunError> {
         let known = self.keyframes.len();
         self.keyframes.refresh()?;
         let unchanged = self.keyframes.unchanged();
@@ -155,8 +156,8 @@ impl LoopClosing {
         Ok(was_cut.then_some(unchanged))
     }
 
-    fn close(&mut self) -> Result<Step<LoopHeader>, StageError> {
-        let mut read = |index: usize| self.keyframes.read(index).map_err(StageError::from);
+    fn close(&mut self) -> Result<Step<LoopHeader>, RunError> {
+        let mut read = |index: usize| self.keyframes.read(index).map_err(RunError::from);
         if let Some(place) = self.closer.describe(&mut read).map_err(failed)? {
             self.places.append(&place)?;
             return Ok(Step::Worked(None));
@@ -176,7 +177,7 @@ impl LoopClosing {
     }
 
     /// Counts the loops of a query, which are to be published.
-    fn note(&mut self, query: &Query) -> Result<(), StageError> {
+    fn note(&mut self, query: &Query) -> Result<(), RunError> {
         let found = loops_of(query, self.loops, &mut self.keyframes)?;
         self.loops += found.len() as u64;
         self.pending.extend(found);
@@ -184,9 +185,9 @@ impl LoopClosing {
     }
 }
 
-fn failed(error: ClosingError<StageError>) -> StageError {
+fn failed(error: ClosingError<RunError>) -> RunError {
     match error {
         ClosingError::Source(error) => error,
-        other => StageError::input(other),
+        other => RunError::input(other),
     }
 }

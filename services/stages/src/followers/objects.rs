@@ -2,7 +2,7 @@
 //! `journal/objects.log`. A restarted process works through the scans from the first one, since an
 //! identity can be as old as the run, and appends the records that the log lacks.
 
-use gyre_contract::{Item, MAX_LISTED, Objects, ObjectsHeader};
+use gyre_contract::{Item, MAX_LISTED, Objects, ObjectsHeader, run::StageCounters};
 use gyre_geometry::xy_yaw;
 use gyre_journal::{
     objects::{LoggedObjects, listed},
@@ -12,11 +12,12 @@ use gyre_masking::MaskingConfig;
 use gyre_objects::{Object, ObjectTracker, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
 use gyre_stage::{
-    Follower, Launch, StageCounters, StageError,
-    follower::{self, LogId, Progress, Step},
+    Follower, Launch,
+    follower::{self, Progress, Step},
 };
+use gyre_transport::{RunError, services::LogId};
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let masking: MaskingConfig = launch.section("masking")?;
     let out = &launch.manifest.out;
@@ -34,9 +35,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     follower::run(launch, &mut tracking)
 }
 
-pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, StageError> {
-    let runtime = masking.onnx_runtime().map_err(StageError::input)?;
-    ObjectTracker::new(runtime.as_deref()).map_err(StageError::input)
+pub fn tracker(masking: &MaskingConfig) -> Result<ObjectTracker, RunError> {
+    let runtime = masking.onnx_runtime().map_err(RunError::input)?;
+    ObjectTracker::new(runtime.as_deref()).map_err(RunError::input)
 }
 
 struct Tracking {
@@ -50,7 +51,7 @@ struct Tracking {
 impl Tracking {
     /// Looks for new scans. If some of the scans that were read have been cut off, it restarts from
     /// the first scan.
-    fn look(&mut self) -> Result<(), StageError> {
+    fn look(&mut self) -> Result<(), RunError> {
         self.scans.refresh()?;
         if self.scans.unchanged() < self.read {
             self.tracked.cut(self.scans.unchanged())?;
@@ -61,7 +62,7 @@ impl Tracking {
     }
 
     /// Tracks the objects of the next scan. Returns the message about it, unless the log has them.
-    fn track_next(&mut self) -> Result<Option<ObjectsHeader>, StageError> {
+    fn track_next(&mut self) -> Result<Option<ObjectsHeader>, RunError> {
         let scan = self.scans.read(self.read)?;
         let placed = PlacedScan {
             stamp_ns: scan.stamp_ns,
@@ -71,7 +72,7 @@ impl Tracking {
         let objects = self
             .tracker
             .update(&placed, &scan.points)
-            .map_err(StageError::input)?;
+            .map_err(RunError::input)?;
         let known = self.read < self.tracked.len();
         self.read += 1;
         if known {
@@ -113,7 +114,7 @@ impl Follower for Tracking {
     type Output = Objects;
     const LOGS: &'static [LogId] = &[LogId::Scans];
 
-    fn step(&mut self) -> Result<Step<ObjectsHeader>, StageError> {
+    fn step(&mut self) -> Result<Step<ObjectsHeader>, RunError> {
         self.look()?;
         if self.read < self.scans.len() {
             return Ok(Step::Worked(self.track_next()?));
@@ -125,7 +126,7 @@ impl Follower for Tracking {
         Ok(Step::Ended)
     }
 
-    fn sync(&mut self) -> Result<(), StageError> {
+    fn sync(&mut self) -> Result<(), RunError> {
         Ok(self.tracked.sync()?)
     }
 

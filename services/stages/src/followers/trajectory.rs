@@ -5,25 +5,27 @@
 
 use std::{mem, path::Path};
 
-use gyre_contract::run::SourceConfig;
-use gyre_contract::{Correction, CorrectionHeader, Item};
-use gyre_geometry::samples::GnssConfig;
-use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
+use gyre_contract::{
+    Correction, CorrectionHeader, Item,
+    run::{SourceConfig, StageCounters},
+};
+use gyre_geometry::{UncertainMotion, covariance, samples::GnssConfig, xy_yaw};
 use gyre_recording::{ReceivedFixes, received_fixes};
 use gyre_slam::{
     EstimatorKind, Fixes, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig,
     TrajectoryEstimator,
 };
 use gyre_stage::{
-    Follower, GnssReceiver, Launch, StageCounters, StageError,
-    follower::{self, LogId, Progress, Step},
+    Follower, GnssReceiver, Launch,
+    follower::{self, Progress, Step},
 };
+use gyre_transport::{RunError, services::LogId};
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let slam: SlamConfig = launch.section("slam")?;
     let kind = slam.kind.estimator().ok_or_else(|| {
-        StageError::Input("slam.kind is none: there is no trajectory to correct".to_owned())
+        RunError::Input("slam.kind is none: there is no trajectory to correct".to_owned())
     })?;
     let out = &launch.manifest.out;
     let config: GnssConfig = launch.section("gnss")?;
@@ -36,10 +38,10 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Returns the fixes of GNSS that are known by now; none without `[gnss]`.
-fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
+fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, RunError> {
     let source: SourceConfig = launch.section("source")?;
     let out = &launch.manifest.out;
-    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(StageError::input)?;
+    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(RunError::input)?;
     let fixes = log.map(|log| log.on_radar(config)).unwrap_or_default();
     Ok(Fixes::new(fixes, config))
 }
@@ -63,7 +65,7 @@ struct Trajectory {
 }
 
 impl Trajectory {
-    fn open(out: &Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
+    fn open(out: &Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, RunError> {
         Ok(Self {
             kind,
             keyframes: RecordReader::open(out)?,
@@ -81,7 +83,7 @@ impl Trajectory {
 
     /// Looks for new records. If some of the records that were read have been cut off, it restarts
     /// from the first record.
-    fn look(&mut self) -> Result<(), StageError> {
+    fn look(&mut self) -> Result<(), RunError> {
         self.keyframes.refresh()?;
         self.queries.refresh()?;
         let unchanged = [self.keyframes.unchanged(), self.queries.unchanged()];
@@ -94,12 +96,12 @@ impl Trajectory {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<bool, StageError> {
+    fn advance(&mut self) -> Result<bool, RunError> {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {
             let keyframe = self.keyframes.read_without_points(keyframes)?;
             let fixes = self.estimator.fixes().settled();
-            self.estimator.push(&keyframe).map_err(StageError::input)?;
+            self.estimator.push(&keyframe).map_err(RunError::input)?;
             // Without a new loop or fix the poses before stay where they are.
             let standing = self.corrected.map(|last| last.then(&keyframe.motion));
             self.corrected = standing.filter(|_| self.estimator.fixes().settled() == fixes);
@@ -114,7 +116,7 @@ impl Trajectory {
             if query.loops().next().is_some() {
                 self.corrected = None;
             }
-            self.estimator.close(&query).map_err(StageError::input)?;
+            self.estimator.close(&query).map_err(RunError::input)?;
             self.read[1] += 1;
         } else {
             return Ok(false);
@@ -124,7 +126,7 @@ impl Trajectory {
     }
 
     /// Takes the fixes that have arrived; at the end of the run all of them.
-    fn take_live_fixes(&mut self) -> Result<(), StageError> {
+    fn take_live_fixes(&mut self) -> Result<(), RunError> {
         let Some(live) = &mut self.live_fixes else {
             return Ok(());
         };
@@ -137,7 +139,7 @@ impl Trajectory {
         Ok(())
     }
 
-    fn correct(&mut self) -> Result<Option<CorrectionHeader>, StageError> {
+    fn correct(&mut self) -> Result<Option<CorrectionHeader>, RunError> {
         let Some(newest) = &self.newest else {
             return Ok(None);
         };
@@ -146,12 +148,12 @@ impl Trajectory {
             Some(corrected) => corrected,
             None => {
                 match self.is_final {
-                    true => self.estimator.solve().map_err(StageError::input)?,
-                    false => self.estimator.update().map_err(StageError::input)?,
+                    true => self.estimator.solve().map_err(RunError::input)?,
+                    false => self.estimator.update().map_err(RunError::input)?,
                 }
                 self.estimator
                     .pose(keyframes - 1)
-                    .map_err(StageError::input)?
+                    .map_err(RunError::input)?
             }
         };
         self.corrected = Some(corrected);
@@ -177,7 +179,7 @@ impl Follower for Trajectory {
     type Output = Correction;
     const LOGS: &'static [LogId] = &[LogId::Keyframes, LogId::Loops];
 
-    fn step(&mut self) -> Result<Step<CorrectionHeader>, StageError> {
+    fn step(&mut self) -> Result<Step<CorrectionHeader>, RunError> {
         if self.advance()? {
             return Ok(Step::Worked(None));
         }
@@ -201,7 +203,7 @@ impl Follower for Trajectory {
         })
     }
 
-    fn sync(&mut self) -> Result<(), StageError> {
+    fn sync(&mut self) -> Result<(), RunError> {
         let received = self.live_fixes.as_mut();
         received.map_or(Ok(()), LiveFixes::finish)
     }
@@ -223,7 +225,7 @@ struct LiveFixes {
 }
 
 impl LiveFixes {
-    fn open(config: GnssConfig, out: &Path) -> Result<Self, StageError> {
+    fn open(config: GnssConfig, out: &Path) -> Result<Self, RunError> {
         let log = received_fixes(out);
         Ok(Self {
             receiver: GnssReceiver::open(&config.listen, &log)?,
@@ -233,19 +235,19 @@ impl LiveFixes {
         })
     }
 
-    fn finish(&mut self) -> Result<(), StageError> {
+    fn finish(&mut self) -> Result<(), RunError> {
         self.receiver.finish()
     }
 
     /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
     /// With `is_last` nothing is received after this.
-    fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, StageError> {
+    fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, RunError> {
         if is_last {
             self.finish()?;
         }
         let received = &mut self.received;
         let read = self.receiver.if_grown(|| received.read_on())?;
-        read.unwrap_or(Ok(())).map_err(StageError::input)?;
+        read.unwrap_or(Ok(())).map_err(RunError::input)?;
         let new = self.received.count() - self.examined;
         let least = if is_last {
             1

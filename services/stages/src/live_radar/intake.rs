@@ -3,9 +3,8 @@
 use std::{fmt::Display, time::Duration};
 
 use gyre_colossus::{Azimuth, BadConfiguration, Configuration};
-use gyre_contract::ScanHeader;
+use gyre_contract::{ScanHeader, control::Received};
 use gyre_datasets::DatasetOptions;
-use gyre_stage::source::Received;
 use thiserror::Error;
 
 use crate::live_radar::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};

@@ -3,11 +3,9 @@
 use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_colossus::{Configuration, Event, Health, HealthStatus, Message};
-use gyre_contract::{ScanHeader, StageId};
-use gyre_stage::{
-    StageError, clock,
-    source::{Arrival, Received as Counts, Sensor},
-};
+use gyre_contract::{ScanHeader, StageId, control::Received as Counts};
+use gyre_stage::source::{Arrival, Sensor};
+use gyre_transport::{RunError, clock};
 
 use crate::live_radar::{
     Intake, NoScans, Settings,
@@ -43,12 +41,12 @@ impl Radar {
 
     /// Begins the scans of a new configuration. One whose scans do not fit into this run is ignored
     /// if it came in a datagram, which anybody can send.
-    fn configure(&mut self, radar: Configuration, room: usize) -> Result<(), StageError> {
+    fn configure(&mut self, radar: Configuration, room: usize) -> Result<(), RunError> {
         match self.intake.configure(radar, room) {
             Ok(true) => self.connection.lock_sender(),
             Ok(false) => {}
             Err(error @ NoScans::TooLarge { .. }) if !self.settings.address.is_udp() => {
-                return Err(StageError::Input(error.to_string()));
+                return Err(RunError::Input(error.to_string()));
             }
             Err(error) => self.refuse(&error.to_string()),
         }
@@ -78,7 +76,7 @@ impl Radar {
         self.intake.restart();
     }
 
-    fn parse(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<bool, StageError> {
+    fn parse(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<bool, RunError> {
         while let Some(event) = self.messages.next() {
             match event {
                 Event::Message(Message::Azimuth(azimuth)) => {
@@ -116,7 +114,7 @@ impl Sensor for Radar {
         self.connection.socket()
     }
 
-    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
+    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, RunError> {
         let mut has_received = false;
         for _ in 0..MAX_READS {
             if self.parse(header, bytes)? {

@@ -5,9 +5,9 @@ use std::time::Duration;
 use gyre_colossus::{
     Azimuth, BadConfiguration, Configuration, FoundClock, RadarClock, SweepAssembler,
 };
-use gyre_contract::ScanHeader;
+use gyre_contract::{ScanHeader, control::LastScan};
 use gyre_datasets::DatasetOptions;
-use gyre_stage::{clock, source::LastScan};
+use gyre_transport::clock;
 
 use crate::live_radar::{read_delay::ReadDelay, turn_counter::TurnCounter};
 

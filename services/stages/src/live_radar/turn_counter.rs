@@ -1,6 +1,6 @@
 //! The count of the radar's turns without a scan.
 
-use gyre_stage::source::LastScan;
+use gyre_contract::control::LastScan;
 
 /// The limit of the pace of the radar's clock: recordings may be played so fast.
 const MAX_PACE: f64 = 4.0;

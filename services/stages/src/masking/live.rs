@@ -8,9 +8,9 @@ use std::{collections::VecDeque, mem};
 use gyre_contract::{Item, NumberedBy, Scan, Window, flag};
 use gyre_geometry::samples::Sample;
 use gyre_radar::continues;
-use gyre_stage::{
-    Generation, Launch, Listener, Manifest, StageError,
-    inputs::Action,
+use gyre_stage::{Launch, inputs::Action};
+use gyre_transport::{
+    Generation, Listener, Manifest, RunError,
     reader::{Port, Received},
 };
 
@@ -49,10 +49,10 @@ struct Chain {
 }
 
 impl NewestOnly {
-    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+    pub fn open(launch: &Launch) -> Result<Self, RunError> {
         let window = launch.manifest.window;
         Ok(Self {
-            port: Port::open(launch)?,
+            port: launch.port()?,
             queue: VecDeque::with_capacity(window.live_depth + 2),
             previous: None,
             window,
@@ -65,7 +65,7 @@ impl NewestOnly {
 
     /// Resumes the chain after a start. `None` while all received scans precede the newest pose: a
     /// restarted source repeats such scans, and the history of a running source begins with them.
-    fn resume(&mut self, newest_pose: &Item) -> Result<Option<Chain>, StageError> {
+    fn resume(&mut self, newest_pose: &Item) -> Result<Option<Chain>, RunError> {
         while self
             .queue
             .front()
@@ -123,7 +123,7 @@ impl NewestOnly {
 }
 
 impl Queue for NewestOnly {
-    fn receive(&mut self) -> Result<(), StageError> {
+    fn receive(&mut self) -> Result<(), RunError> {
         while let Some(received) = self.port.receive()? {
             if self
                 .chain
@@ -147,7 +147,7 @@ impl Queue for NewestOnly {
         &mut self,
         resume_at: &Item,
         newest_pose: Option<u64>,
-    ) -> Result<Action, StageError> {
+    ) -> Result<Action, RunError> {
         let chain = match self.chain {
             None => self.resume(resume_at)?,
             chain => chain,

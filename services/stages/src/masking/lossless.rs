@@ -2,14 +2,14 @@
 
 use gyre_contract::{Item, Scan, Window, flag};
 use gyre_geometry::samples::Sample;
-use gyre_stage::{
-    Launch, Listener, StageError,
-    inputs::Action,
+use gyre_stage::{Launch, inputs::Action};
+use gyre_transport::{
+    Listener, RunError,
     reader::{Reader, Received},
 };
 
 pub trait Queue {
-    fn receive(&mut self) -> Result<(), StageError>;
+    fn receive(&mut self) -> Result<(), RunError>;
 
     /// Returns what to do with the current scan. `resume_at` is the item of the newest pose at the
     /// last start of the sink, `newest_pose` the number of the newest pose now.
@@ -17,7 +17,7 @@ pub trait Queue {
         &mut self,
         resume_at: &Item,
         newest_pose: Option<u64>,
-    ) -> Result<Action, StageError>;
+    ) -> Result<Action, RunError>;
 
     fn current(&self) -> Option<&Received<Scan>>;
 
@@ -46,9 +46,9 @@ pub struct InOrder {
 }
 
 impl InOrder {
-    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+    pub fn open(launch: &Launch) -> Result<Self, RunError> {
         Ok(Self {
-            reader: Reader::open(launch, None)?,
+            reader: launch.reader(None)?,
             window: launch.manifest.window,
             started: false,
         })
@@ -56,11 +56,11 @@ impl InOrder {
 }
 
 impl Queue for InOrder {
-    fn receive(&mut self) -> Result<(), StageError> {
+    fn receive(&mut self) -> Result<(), RunError> {
         self.reader.head().map(drop)
     }
 
-    fn next_action(&mut self, _: &Item, newest_pose: Option<u64>) -> Result<Action, StageError> {
+    fn next_action(&mut self, _: &Item, newest_pose: Option<u64>) -> Result<Action, RunError> {
         let Some(head) = self.reader.head()? else {
             return Ok(Action::Wait);
         };

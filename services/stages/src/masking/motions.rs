@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use gyre_contract::{Item, Motion, MotionEstimate, flag};
 use gyre_geometry::Twist;
 use gyre_radar::LostAzimuths;
-use gyre_stage::{Launch, Listener, StageError, reader::Port, source::Credit};
+use gyre_stage::{Launch, source::Credit};
+use gyre_transport::{Listener, RunError, reader::Port};
 
 /// Number of motions kept: more than any window and lag need.
 const KEPT: usize = 256;
@@ -20,16 +21,16 @@ pub struct Motions {
 }
 
 impl Motions {
-    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+    pub fn open(launch: &Launch) -> Result<Self, RunError> {
         Ok(Self {
-            motions: Port::open(launch)?,
+            motions: launch.port()?,
             credit: Credit::open(launch)?,
             known: KnownMotions::default(),
             lost: BTreeMap::new(),
         })
     }
 
-    pub fn update(&mut self) -> Result<(), StageError> {
+    pub fn update(&mut self) -> Result<(), RunError> {
         while let Some(received) = self.motions.receive()? {
             self.known
                 .receive(received.item(), &received.header().motion);

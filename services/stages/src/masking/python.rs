@@ -4,13 +4,16 @@ use std::{error::Error, path::Path};
 
 use gyre_masking::{Factors, MaskFunction};
 use gyre_radar::{PolarScan, RasterConfig, Sense};
-use gyre_stage::python_function::{Argument, Array, Function, Returned, Scan};
-use gyre_stage::{Launch, StageError};
+use gyre_stage::{
+    Launch,
+    python_function::{Argument, Array, Function, Returned, Scan},
+};
+use gyre_transport::RunError;
 use ndarray::{ArrayView1, ArrayView2};
 use serde_json::{Map, json};
 
 /// Loads the function `mask` of a file of Python, for [`run_with`](crate::masking::run_with).
-pub fn python(launch: &Launch, file: &Path) -> Result<Box<dyn MaskFunction>, StageError> {
+pub fn python(launch: &Launch, file: &Path) -> Result<Box<dyn MaskFunction>, RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     let function = Function::load(file, "mask")?;
     let cell_m = raster.cell_m;

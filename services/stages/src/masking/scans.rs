@@ -1,14 +1,16 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
 use gyre_contract::{Item, Scan, Window, flag};
-use gyre_geometry::Twist;
-use gyre_geometry::samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate};
+use gyre_geometry::{
+    Twist,
+    samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate},
+};
 use gyre_radar::LostAzimuths;
 use gyre_stage::{
-    Launch, Listener, StageError,
+    Launch,
     inputs::{Action, Inputs},
-    reader::Received,
 };
+use gyre_transport::{Listener, RunError, reader::Received};
 
 use crate::masking::{
     live::NewestOnly,
@@ -47,7 +49,7 @@ pub struct MovedScan<'a> {
 impl Inputs for Scans {
     type View<'a> = ScanView<'a>;
 
-    fn open(launch: &Launch) -> Result<Self, StageError> {
+    fn open(launch: &Launch) -> Result<Self, RunError> {
         let motions = Motions::open(launch)?;
         let queue: Box<dyn Queue> = match launch.manifest.live {
             false => Box::new(InOrder::open(launch)?),
@@ -65,7 +67,7 @@ impl Inputs for Scans {
         })
     }
 
-    fn next_action(&mut self) -> Result<Action, StageError> {
+    fn next_action(&mut self) -> Result<Action, RunError> {
         self.queue.receive()?;
         self.motions.update()?;
         // The newest pose decides which scans are still needed, and in live mode where the chain
@@ -144,7 +146,7 @@ impl Scans {
     /// Hands the samples of the current scan to gyro and wheels, once. Before that it hands over
     /// the samples of the previous scan, if that scan came with a restart, and of the scans dropped
     /// since.
-    fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
+    fn take_samples(&mut self, starts_chain: bool) -> Result<(), RunError> {
         let dropped = self.queue.take_dropped();
         let scans = [self.queue.previous(), self.queue.current()];
         let is_new = |scan: &&Received<Scan>| self.sampled < Some(scan.item().published);
@@ -182,7 +184,7 @@ impl Scans {
     }
 }
 
-fn samples_of(received: &Received<Scan>) -> Result<(&[Sample], i64, [i64; 2]), StageError> {
+fn samples_of(received: &Received<Scan>) -> Result<(&[Sample], i64, [i64; 2]), RunError> {
     let (header, bytes) = (received.header(), received.values());
     let parts = header.view(bytes).zip(header.samples(bytes));
     let (scan, samples) =

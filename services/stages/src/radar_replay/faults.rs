@@ -1,10 +1,12 @@
 //! Faults to inject into the played scans: `source.faults`.
 
-use gyre_contract::ScanHeader;
-use gyre_contract::run::{PlayedFault, PlayedFaultKind};
+use gyre_contract::{
+    ScanHeader,
+    run::{PlayedFault, PlayedFaultKind},
+};
 use gyre_datasets::ScanSamples;
 use gyre_geometry::samples::{Sample, SampleKind};
-use gyre_stage::StageError;
+use gyre_transport::RunError;
 
 #[derive(Clone, Debug)]
 pub struct Faults {
@@ -14,9 +16,9 @@ pub struct Faults {
 }
 
 impl Faults {
-    pub fn of(faults: Vec<PlayedFault>, first_ns: Option<i64>) -> Result<Self, StageError> {
+    pub fn of(faults: Vec<PlayedFault>, first_ns: Option<i64>) -> Result<Self, RunError> {
         match (first_ns, faults.is_empty()) {
-            (None, false) => Err(StageError::Input(
+            (None, false) => Err(RunError::Input(
                 "source.faults cannot be put into this recording, since the times of its scans are not known before they are read"
                     .to_owned(),
             )),
@@ -27,13 +29,13 @@ impl Faults {
         }
     }
 
-    pub fn put_into(&self, samples: ScanSamples) -> Result<ScanSamples, StageError> {
+    pub fn put_into(&self, samples: ScanSamples) -> Result<ScanSamples, RunError> {
         let is_of_samples = |fault: &PlayedFault| fault.kind != PlayedFaultKind::RadarBlind;
         if !self.faults.iter().any(is_of_samples) {
             return Ok(samples);
         }
         match samples {
-            ScanSamples::Recorded(_) => Err(StageError::Input(
+            ScanSamples::Recorded(_) => Err(RunError::Input(
                 "source.faults of gyro and wheels are put into their logs, and the recording of a run has none: play what it was recorded from, or keep `radar-blind` alone"
                     .to_owned(),
             )),

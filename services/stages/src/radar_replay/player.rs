@@ -2,23 +2,21 @@
 
 use std::ops::Range;
 
-use gyre_contract::run::SourceConfig;
+use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_recording::Recording;
-use gyre_stage::{
-    Launch, StageCounters, StageError,
-    source::{RecordedMessage, run_player},
-};
+use gyre_stage::{Launch, source::run_player};
+use gyre_transport::{RecordedMessage, RunError};
 
 /// Plays the recording of the section `[source]` from its topic on, until SIGTERM.
-pub fn play_recorded(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn play_recorded(launch: &Launch) -> Result<StageCounters, RunError> {
     let config: SourceConfig = launch.section("source")?;
     let manifest = &launch.manifest;
     let topics = config.from.topics(manifest.refines, manifest.window.slam);
-    let mut player = Player::open(&config, topics).map_err(StageError::Input)?;
+    let mut player = Player::open(&config, topics).map_err(RunError::Input)?;
     let (topics, items) = (player.topics.clone(), player.items.clone());
     run_player(launch, &topics, items, |topic, seq| {
         let stored = player.recording.read(topic, seq);
-        let stored = stored.map_err(StageError::input)?;
+        let stored = stored.map_err(RunError::input)?;
         Ok(RecordedMessage {
             header: stored.header,
             payload: stored.payload,

@@ -2,21 +2,21 @@
 //! scans over every angle (Masking by Moving; `raw` in Weston et al., Table III). It replaces both
 //! stages of the decoupled search.
 
-use gyre_contract::{Masked, Motion, MotionEstimate, StageId};
+use gyre_contract::{Masked, Motion, MotionEstimate, StageId, run::StageCounters};
 use gyre_matching::{ExhaustiveConfig, ExhaustiveSearch};
 use gyre_radar::raster::RasterConfig;
 use gyre_stage::{
-    Launch, Stage, StageCounters, StageError,
+    Launch, Stage,
     inputs::{PairView, Pairs},
     stage,
-    writer::Draft,
 };
+use gyre_transport::{RunError, writer::Draft};
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: ExhaustiveConfig = launch.section("exhaustive")?;
-    let search = ExhaustiveSearch::new(raster.n, raster.cell_m.into(), &config)
-        .map_err(StageError::input)?;
+    let search =
+        ExhaustiveSearch::new(raster.n, raster.cell_m.into(), &config).map_err(RunError::input)?;
     stage::run(launch, &mut JointStage { search })
 }
 
@@ -33,7 +33,7 @@ impl Stage for JointStage {
         &mut self,
         input: PairView<'_, Masked>,
         output: &mut Draft<Motion>,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         let pair = input.rasters()?;
         let found = pair
             .earlier

@@ -6,8 +6,12 @@ use std::path::Path;
 use gyre_contract::{Header, Masked};
 use gyre_matching::{MotionMatch, RotationMatch};
 use gyre_radar::RasterConfig;
-use gyre_stage::python_function::{Argument, Array, Function, Returned, Scan};
-use gyre_stage::{Launch, StageError, inputs::PairView};
+use gyre_stage::{
+    Launch,
+    inputs::PairView,
+    python_function::{Argument, Array, Function, Returned, Scan},
+};
+use gyre_transport::RunError;
 use nalgebra::matrix;
 use ndarray::ArrayView2;
 use serde_json::{Map, json};
@@ -16,7 +20,7 @@ use crate::search::{rotation, translation};
 
 /// Loads the function `rotation` of a file: the yaw of the later scan in the frame of the earlier
 /// one, rad, and its standard deviation.
-pub fn rotation(launch: &Launch, file: &Path) -> Result<rotation::Search, StageError> {
+pub fn rotation(launch: &Launch, file: &Path) -> Result<rotation::Search, RunError> {
     let (mut function, cell_m) = load(launch, file, "rotation")?;
     Ok(Box::new(move |pair| {
         let Some(scans) = scans(pair, cell_m)? else {
@@ -34,7 +38,7 @@ pub fn rotation(launch: &Launch, file: &Path) -> Result<rotation::Search, StageE
 
 /// Loads the function `translation` of a file: the place of the later scan in the frame of the
 /// earlier one, m, and its standard deviation or covariance.
-pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, StageError> {
+pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, RunError> {
     let (mut function, cell_m) = load(launch, file, "translation")?;
     Ok(Box::new(move |pair, rotation| {
         let Some([scan, previous]) = scans(pair, cell_m)? else {
@@ -58,7 +62,7 @@ pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, 
     }))
 }
 
-fn load(launch: &Launch, file: &Path, name: &str) -> Result<(Function, f32), StageError> {
+fn load(launch: &Launch, file: &Path, name: &str) -> Result<(Function, f32), RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     Ok((Function::load(file, name)?, raster.cell_m))
 }
@@ -67,7 +71,7 @@ fn load(launch: &Launch, file: &Path, name: &str) -> Result<(Function, f32), Sta
 fn scans<'a>(
     pair: &'a PairView<'a, Masked>,
     cell_m: f32,
-) -> Result<Option<[Scan<'a>; 2]>, StageError> {
+) -> Result<Option<[Scan<'a>; 2]>, RunError> {
     let rasters = pair.rasters()?;
     let (Some(earlier), Some(previous)) = (rasters.earlier, pair.previous) else {
         return Ok(None);
@@ -90,16 +94,16 @@ fn scans<'a>(
 fn call<const N: usize>(
     function: &mut Function,
     arguments: &[Argument<'_>],
-) -> Result<[f64; N], StageError> {
+) -> Result<[f64; N], RunError> {
     let returned = function
         .call(arguments)
-        .map_err(|error| StageError::Transient(error.to_string()))?;
+        .map_err(|error| RunError::Transient(error.to_string()))?;
     let values = match returned {
         Returned::Values(values) => values,
         Returned::Factors(..) => Vec::new(),
     };
     let count = values.len();
     <[f64; N]>::try_from(values).map_err(|_| {
-        StageError::Transient(format!("the search returned {count} numbers: expected {N}"))
+        RunError::Transient(format!("the search returned {count} numbers: expected {N}"))
     })
 }

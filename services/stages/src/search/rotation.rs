@@ -1,24 +1,23 @@
 //! The rotation-search stage: the rotation between consecutive scans from their magnitude spectra
 //! (Weston et al., Sec. III-C, step 1).
 
-use gyre_contract::{Masked, Rotation, RotationEstimate, StageId};
+use gyre_contract::{Masked, Rotation, RotationEstimate, StageId, run::StageCounters};
 use gyre_matching::{RotationConfig, RotationMatch, SequentialRotation};
 use gyre_radar::raster::RasterConfig;
 use gyre_stage::{
-    Launch, Stage, StageCounters, StageError,
+    Launch, Stage,
     inputs::{PairView, Pairs},
     stage,
-    writer::Draft,
 };
+use gyre_transport::{RunError, writer::Draft};
 
 /// Finds the rotation between two scans; `None` where the chain of motions starts.
-pub type Search =
-    Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, StageError>>;
+pub type Search = Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, RunError>>;
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: RotationConfig = launch.section("rotation")?;
-    let mut rotation = SequentialRotation::new(raster.n, &config).map_err(StageError::input)?;
+    let mut rotation = SequentialRotation::new(raster.n, &config).map_err(RunError::input)?;
     let search = move |input: &PairView<'_, Masked>| {
         let (seq, pair) = (input.current.item().seq, input.rasters()?);
         let turn = input.current.header().turn().map(|turn| turn.yaw_rad);
@@ -30,7 +29,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Runs the stage until SIGTERM with a search of your own.
-pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
+pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, RunError> {
     stage::run(launch, &mut RotationStage { search })
 }
 
@@ -47,7 +46,7 @@ impl Stage for RotationStage {
         &mut self,
         input: PairView<'_, Masked>,
         output: &mut Draft<Rotation>,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         let found = (self.search)(&input)?;
         output.header().rotation = found
             .as_ref()

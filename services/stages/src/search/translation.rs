@@ -1,27 +1,26 @@
 //! The translation-search stage: the translation between consecutive scans once their rotation is
 //! known (Weston et al., Eq. 8).
 
-use gyre_contract::{Masked, Motion, MotionEstimate, Rotation, StageId};
+use gyre_contract::{Masked, Motion, MotionEstimate, Rotation, StageId, run::StageCounters};
 use gyre_matching::{MotionMatch, RotationMatch, TranslationConfig, TranslationSearch};
 use gyre_radar::raster::RasterConfig;
 use gyre_stage::{
-    Launch, Stage, StageCounters, StageError,
+    Launch, Stage,
     inputs::{Joined, JoinedView, PairView},
     stage,
-    writer::Draft,
 };
+use gyre_transport::{RunError, writer::Draft};
 
 /// Finds the motion between two scans whose rotation is known; `None` where the chain of motions
 /// starts.
-pub type Search = Box<
-    dyn FnMut(&PairView<'_, Masked>, &RotationMatch) -> Result<Option<MotionMatch>, StageError>,
->;
+pub type Search =
+    Box<dyn FnMut(&PairView<'_, Masked>, &RotationMatch) -> Result<Option<MotionMatch>, RunError>>;
 
-pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: TranslationConfig = launch.section("translation")?;
-    let mut search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
-        .map_err(StageError::input)?;
+    let mut search =
+        TranslationSearch::new(raster.n, raster.cell_m.into(), &config).map_err(RunError::input)?;
     let search = move |input: &PairView<'_, Masked>, rotation: &RotationMatch| {
         let pair = input.rasters()?;
         pair.earlier
@@ -33,7 +32,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Runs the stage until SIGTERM with a search of your own.
-pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
+pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, RunError> {
     stage::run(launch, &mut TranslationStage { search })
 }
 
@@ -50,7 +49,7 @@ impl Stage for TranslationStage {
         &mut self,
         input: JoinedView<'_, Masked, Rotation>,
         output: &mut Draft<Motion>,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         let rotation = input.other.header().rotation;
         let found = (self.search)(&input.pair, &rotation.into())?;
         output.header().motion = found.map_or_else(MotionEstimate::default, |found| {

@@ -10,9 +10,8 @@ use std::{
     time::Duration,
 };
 
+use gyre_client::{RunError, last_line, wake::Signals};
 use gyre_configuration::terminal::{Failure, own, print};
-use gyre_stage::{StageError, wake::Signals};
-use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::batch::{Drive, End, List, Outcome, Row};
@@ -40,7 +39,7 @@ pub fn compute(list: &List, out: &Path, jobs: usize) -> Result<(usize, bool), Fa
         {
             let path = out.join("output").join(format!("{}.txt", drive.name));
             let child = Child::start(drive, command(list, out, drive), &path);
-            running.push(child.map_err(StageError::file(&path))?);
+            running.push(child.map_err(RunError::file(&path))?);
         }
         if running.is_empty() {
             return Ok((earlier, interrupted));

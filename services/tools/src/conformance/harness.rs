@@ -3,9 +3,9 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+use gyre_client::{Manifest, RunError, TopicWriter, wake::Signals};
 use gyre_configuration::terminal::own;
 use gyre_contract::{Item, Pose, PoseHeader, StageId, flag};
-use gyre_stage::{Manifest, StageError, wake::Signals, writer::TopicWriter};
 use gyre_supervise::{
     Death, Scheduling, SuperviseError,
     rig::{Process, Recorded, Rig, Tap},
@@ -35,7 +35,7 @@ impl Candidate {
         signals: &'a Signals,
     ) -> Result<Rig<'a>, SuperviseError> {
         for folder in ["log", "journal"] {
-            gyre_storage::create_folder(&out.join(folder)).map_err(StageError::from)?;
+            gyre_storage::create_folder(&out.join(folder)).map_err(RunError::from)?;
         }
         let manifest = Manifest {
             out,
@@ -67,7 +67,7 @@ pub(crate) enum Sent {
 
 impl<'a> Harness<'a> {
     /// Creates the services of the run, and opens the topics of the stage.
-    pub(crate) fn open(mut rig: Rig<'a>, candidate: &'a Candidate) -> Result<Self, StageError> {
+    pub(crate) fn open(mut rig: Rig<'a>, candidate: &'a Candidate) -> Result<Self, RunError> {
         rig.create_services()?;
         let topics = StageTopics::of(candidate.stage, rig.manifest());
         let mut harness = Self {
@@ -83,7 +83,7 @@ impl<'a> Harness<'a> {
     }
 
     /// Opens the publishers of the inputs, with empty histories.
-    pub(crate) fn open_feeds(&mut self) -> Result<(), StageError> {
+    pub(crate) fn open_feeds(&mut self) -> Result<(), RunError> {
         self.feeds.clear();
         for topic in self.topics.inputs() {
             self.feeds.insert(topic, self.rig.feed(topic)?);
@@ -104,7 +104,7 @@ impl<'a> Harness<'a> {
     }
 
     /// Answers the subscribe handshakes of the process; returns the topics that it has notified.
-    pub(crate) fn answer_handshakes(&self) -> Result<Vec<&'static str>, StageError> {
+    pub(crate) fn answer_handshakes(&self) -> Result<Vec<&'static str>, RunError> {
         let mut notified = Vec::new();
         for (topic, feed) in &self.feeds {
             if feed.answer_handshakes()? {
@@ -115,7 +115,7 @@ impl<'a> Harness<'a> {
     }
 
     /// Connects to all subscribers, whether they have notified or not.
-    pub(crate) fn connect(&self) -> Result<(), StageError> {
+    pub(crate) fn connect(&self) -> Result<(), RunError> {
         self.feeds
             .values()
             .try_for_each(TopicWriter::accept_readers)
@@ -125,16 +125,16 @@ impl<'a> Harness<'a> {
         self.rig.has_publisher(self.candidate.stage)
     }
 
-    pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {
+    pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), RunError> {
         let feed = self.feeds.get(topic);
         feed.map_or(Ok(()), |feed| message.send(feed))
     }
 
     /// Receives the next message of the process; `None` if there is no message yet.
-    pub(crate) fn receive(&self) -> Result<Option<Sent>, StageError> {
+    pub(crate) fn receive(&self) -> Result<Option<Sent>, RunError> {
         match Recorded::receive(&self.output) {
             Ok(message) => Ok(message.map(Sent::Message)),
-            Err(StageError::Malformed { seq, reason, .. }) => Ok(Some(Sent::Malformed {
+            Err(RunError::Malformed { seq, reason, .. }) => Ok(Some(Sent::Malformed {
                 seq,
                 sentence: format!("item {seq} cannot be read by any stage: {reason}"),
             })),

@@ -1,7 +1,7 @@
 //! Inputs that break the contract, and that each reader has to refuse.
 
+use gyre_client::RunError;
 use gyre_contract::{Masked, Message, Motion, Pose, Rotation, Scan};
-use gyre_stage::StageError;
 use gyre_supervise::rig::Recorded;
 
 use crate::conformance::result::floats;
@@ -12,7 +12,7 @@ pub(crate) type Malformed = (&'static str, Recorded);
 const SHORTER: &str = "a payload shorter than its header states";
 
 /// Returns messages of a topic that differ from a valid one by one field that breaks its rule.
-pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
+pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>, RunError> {
     let item = valid.item();
     let mut unknown = item;
     unknown.flags |= 16;
@@ -58,7 +58,7 @@ type Change<'a, M> = (&'static str, &'a dyn Fn(&mut <M as Message>::Header));
 fn changes<M: Message<Header: Copy>>(
     valid: &Recorded,
     changes: &[Change<'_, M>],
-) -> Result<Vec<Malformed>, StageError> {
+) -> Result<Vec<Malformed>, RunError> {
     let changed = changes.iter().map(|(name, change)| {
         let mut header = valid.header::<M>()?;
         change(&mut header);
@@ -67,7 +67,7 @@ fn changes<M: Message<Header: Copy>>(
     changed.collect()
 }
 
-fn masks(valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
+fn masks(valid: &Recorded) -> Result<Vec<Malformed>, RunError> {
     let mut all = changes::<Masked>(
         valid,
         &[

@@ -6,10 +6,11 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::{RunError, TopicWriter, wake::Signals};
 use gyre_configuration::terminal::{Failure, own};
-use gyre_contract::run::StageConfig;
-use gyre_contract::{Item, Message, Motion, Pose, PoseHeader, StageId, compose, flag};
-use gyre_stage::{StageError, wake::Signals, writer::TopicWriter};
+use gyre_contract::{
+    Item, Message, Motion, Pose, PoseHeader, StageId, compose, flag, run::StageConfig,
+};
 use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
 
 use crate::conformance::{Test, harness::start_of_trajectory, topics::StageTopics};
@@ -128,7 +129,7 @@ impl<'a> OwnPipeline<'a> {
         has_end(Pose::TOPIC) && self.taps.iter().all(|(topic, _)| has_end(topic))
     }
 
-    fn receive(&mut self) -> Result<bool, StageError> {
+    fn receive(&mut self) -> Result<bool, RunError> {
         let mut any = false;
         for (topic, tap) in &self.taps {
             while let Some(message) = Recorded::receive(tap)? {
@@ -140,7 +141,7 @@ impl<'a> OwnPipeline<'a> {
     }
 
     /// Publishes the pose of an item that all stages have answered; returns whether there was one.
-    fn integrate(&mut self) -> Result<bool, StageError> {
+    fn integrate(&mut self) -> Result<bool, RunError> {
         let poses = self.reference.topic(Pose::TOPIC);
         let next = poses.len() as u64;
         let answers = self.taps.iter();

@@ -1,18 +1,18 @@
 //! The result in a message: its bytes, and the differences of results.
 
 use bytemuck::{cast_slice, pod_read_unaligned};
+use gyre_client::RunError;
 use gyre_contract::{
     Item, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, Refined, Rotation, Scan,
     ScanHeader, flag,
 };
 use gyre_geometry::wrap_angle;
-use gyre_stage::StageError;
 use gyre_supervise::rig::Recorded;
 use serde::Serialize;
 
 /// Returns the bytes of a message that its inputs determine: all but the times of its processing,
 /// its sender, and the unused part of its payload.
-pub(crate) fn result_bytes(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageError> {
+pub(crate) fn result_bytes(topic: &str, message: &Recorded) -> Result<Vec<u8>, RunError> {
     let item = message.item();
     let item = Item {
         due_ns: 0,
@@ -34,7 +34,7 @@ pub(crate) fn result_bytes(topic: &str, message: &Recorded) -> Result<Vec<u8>, S
 }
 
 /// Returns the header without the unused rows of its tables, and the rows of the sweep.
-fn scan(message: &Recorded) -> Result<Vec<u8>, StageError> {
+fn scan(message: &Recorded) -> Result<Vec<u8>, RunError> {
     let mut header: ScanHeader = message.header::<Scan>()?;
     let azimuths = header.azimuths as usize;
     header.azimuth_stamp_ns[azimuths..].fill(0);
@@ -49,7 +49,7 @@ fn scan(message: &Recorded) -> Result<Vec<u8>, StageError> {
     Ok([message.with::<Scan>(&header).header, rows].concat())
 }
 
-fn masked(message: &Recorded) -> Result<Vec<u8>, StageError> {
+fn masked(message: &Recorded) -> Result<Vec<u8>, RunError> {
     let header = message.header::<Masked>()?;
     let values = floats(&message.payload);
     let mut bytes = message.header.clone();
@@ -91,7 +91,7 @@ impl Differences {
         topic: &str,
         one: &Recorded,
         other: &Recorded,
-    ) -> Result<[Option<f64>; 3], StageError> {
+    ) -> Result<[Option<f64>; 3], RunError> {
         let differences = match topic {
             Scan::TOPIC => [None; 3],
             Masked::TOPIC => {
@@ -128,7 +128,7 @@ impl Differences {
     }
 }
 
-fn cells(message: &Recorded) -> Result<Vec<f32>, StageError> {
+fn cells(message: &Recorded) -> Result<Vec<f32>, RunError> {
     let header = message.header::<Masked>()?;
     Ok(rasters(&header, &floats(&message.payload)).concat())
 }
@@ -191,7 +191,7 @@ impl Spread {
 }
 
 /// Returns the result of a search, a refinement or a composition: x, y (m), yaw (rad).
-fn planar(topic: &str, message: &Recorded) -> Result<[f64; 3], StageError> {
+fn planar(topic: &str, message: &Recorded) -> Result<[f64; 3], RunError> {
     let motion =
         |header: MotionHeader| [header.motion.x_m, header.motion.y_m, header.motion.yaw_rad];
     Ok(match topic {

@@ -9,9 +9,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::RunError;
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Item, Message, Pose, StageId, flag};
-use gyre_stage::StageError;
 use gyre_supervise::{Death, SuperviseError, rig::Recorded};
 
 use crate::conformance::{
@@ -173,7 +173,7 @@ impl<'a> Session<'a> {
     }
 
     /// Takes the messages that the process has sent; returns whether there were any.
-    fn receive(&mut self) -> Result<bool, StageError> {
+    fn receive(&mut self) -> Result<bool, RunError> {
         let mut any = false;
         while let Some(sent) = self.harness.receive()? {
             any = true;
@@ -298,7 +298,7 @@ impl<'a> Session<'a> {
         outputs: RangeFrom<usize>,
         rule: Rule,
         when: &str,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         self.findings.checked(rule);
         for output in &self.outputs[outputs] {
             let item = output.item();

@@ -1,7 +1,7 @@
 //! Shadow mode: a second program for a stage of a running run. It gets the same inputs as the
 //! stage, its results are compared with the stage's and timed, and nobody uses them.
 //!
-//! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it
+//! To the run this process is an observer ([`gyre_client::observer`]): the run neither waits for it
 //! nor fails with it. The program gets the observed items one at a time. The only cost for the
 //! observed run is processor time.
 
@@ -14,9 +14,9 @@ mod shadowing;
 
 use std::{fs, path::PathBuf, time::Duration};
 
+use gyre_client::{Manifest, RunError, observer::ObservedRun, wake::Signals};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{StageId, Window};
-use gyre_stage::{Manifest, StageError, observer::ObservedRun, wake::Signals};
 use gyre_supervise::Scheduling;
 
 use crate::conformance::Candidate;
@@ -64,17 +64,17 @@ pub fn shadow(
     let signals = Signals::install()?;
     let in_report = |name| options.report.as_ref().map(|folder| folder.join(name));
     if let Some(folder) = &options.report {
-        gyre_storage::create_folder(folder).map_err(StageError::from)?;
+        gyre_storage::create_folder(folder).map_err(RunError::from)?;
     }
     let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
-    let folder = folder.map_err(StageError::file(&std::env::temp_dir()))?;
+    let folder = folder.map_err(RunError::file(&std::env::temp_dir()))?;
     let program = ShadowProgram {
         candidate: candidate(run, options)?,
         folder: folder.path().to_owned(),
         output: in_report("shadow.txt"),
     };
     if let Some(path) = &program.output {
-        fs::write(path, "").map_err(StageError::file(path))?;
+        fs::write(path, "").map_err(RunError::file(path))?;
     }
     let topic = program.candidate.topics().output;
     let record = Record::new(options.stage, topic, in_report("shadow.csv").as_deref())?;
@@ -84,14 +84,14 @@ pub fn shadow(
     if let Some(path) = in_report("shadow.json") {
         let text = serde_json::to_string_pretty(&report);
         let text = text.map_err(|error| format!("cannot write shadow.json: {error}"))?;
-        fs::write(&path, text).map_err(StageError::file(&path))?;
+        fs::write(&path, text).map_err(RunError::file(&path))?;
     }
     Ok(report)
 }
 
 /// Returns the program, in a run like the observed one but lossless: the scans that the run's
 /// masking has dropped are not sent at all.
-fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, StageError> {
+fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, RunError> {
     let manifest = run.manifest();
     let configuration = manifest.root.join("config.toml");
     Ok(Candidate {
@@ -108,6 +108,6 @@ fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, StageErr
             ..manifest.clone()
         },
         configuration: fs::read_to_string(&configuration)
-            .map_err(StageError::file(&configuration))?,
+            .map_err(RunError::file(&configuration))?,
     })
 }

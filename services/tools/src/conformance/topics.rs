@@ -1,7 +1,7 @@
 //! The topics of each stage.
 
+use gyre_client::Manifest;
 use gyre_contract::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId};
-use gyre_stage::Manifest;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct StageTopics {

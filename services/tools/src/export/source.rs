@@ -6,8 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
 use gyre_contract::{
     Correction, CorrectionHeader, ListedObject, Message, Objects, ObjectsHeader, Pose as PoseTopic,
     PoseHeader, flag,
@@ -24,8 +26,7 @@ use gyre_recording::{
     bags::{BagWriter, Kept},
 };
 use gyre_ros2_messages::{Vehicle, frames::occupancy_grid};
-use gyre_slam::RecordReader;
-use gyre_slam::mapping::grid;
+use gyre_slam::{RecordReader, mapping::grid};
 
 use crate::maps::map;
 

@@ -7,8 +7,11 @@ use std::{
 
 use gyre_configuration::terminal::Failure;
 use gyre_results::{Content, Out, OutError};
-use gyre_slam::mapping::{Evidence, Origin, require_tiles_only, write_map};
-use gyre_slam::{Keyframe, Record, localisation::Map};
+use gyre_slam::{
+    Keyframe, Record,
+    localisation::Map,
+    mapping::{Evidence, Origin, require_tiles_only, write_map},
+};
 use gyre_storage::{self as storage, StorageError};
 
 /// The next map while it is written, in the folder of the map.

@@ -12,19 +12,23 @@ use std::{
 };
 
 use clap::Args;
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, inputs::Inputs, print};
+use counts::Counts;
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, inputs::Inputs, print},
+};
 use gyre_datasets::write_tum;
 use gyre_geometry::{Pose, covariance, xy_yaw};
 use gyre_radar::Trajectory;
 use gyre_results::{Content, Out};
-use gyre_slam::localisation::{Localisation, Localiser, Map as KeptMap, Observation, Status};
-use gyre_slam::mapping::{Map, Overlay, map_png};
+use gyre_slam::{
+    localisation::{Localisation, Localiser, Map as KeptMap, Observation, Status},
+    mapping::{Map, Overlay, map_png},
+};
 use gyre_storage::{self as storage, Draft};
 use serde::Serialize;
 
 use crate::bar::Bar;
-use counts::Counts;
 
 pub use scans::{RegisteredScan, Scans};
 

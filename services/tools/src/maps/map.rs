@@ -12,16 +12,22 @@ use std::{
     process::ExitCode,
 };
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
 use gyre_datasets::ground_truth::read_trajectory;
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_results::{Content, Out, georeference, map_options, require_results};
-use gyre_slam::mapping::{
-    Drawing, Evidence, MapOptions, Origin, TileSource, write_geotiff, write_pgm, write_web_tiles,
+use gyre_slam::{
+    Keyframe, RecordReader,
+    mapping::{
+        Drawing, Evidence, MapOptions, Origin, TileSource, write_geotiff, write_pgm,
+        write_web_tiles,
+    },
+    records_path,
 };
-use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_storage::StorageError;
 
 use crate::maps::folder;
@@ -203,8 +209,7 @@ mod tests {
     use clap::ValueEnum;
     use gyre_datasets::ground_truth::write_tum_pose;
     use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
-    use gyre_slam::RecordLog;
-    use gyre_slam::mapping::Map;
+    use gyre_slam::{RecordLog, mapping::Map};
 
     use super::*;
 

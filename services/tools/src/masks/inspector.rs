@@ -1,12 +1,16 @@
 //! Masks scans one after the other as a run does, and inspects chosen ones.
 
-use gyre_configuration::terminal::{Failure, print};
-use gyre_configuration::{Configuration, Played};
+use gyre_configuration::{
+    Configuration, Played,
+    terminal::{Failure, print},
+};
 use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_matching::{RefinementConfig, RefinementKind};
+use gyre_matching::{
+    RefinementConfig, RefinementKind,
+    odometry::{Odometry, OdometryConfig},
+};
 use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
 use ndarray::Array2;
 

@@ -11,13 +11,10 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 
+use gyre_client::{control::Control, last_line, wake::Signals};
 use gyre_configuration::terminal::{Failure, own, print};
+use gyre_contract::control::{Phase, Status};
 use gyre_results::SUMMARY;
-use gyre_stage::{
-    control::{Control, Phase, Status},
-    wake::Signals,
-};
-use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::operate::choice::{RunChoice, chosen_to_change};

@@ -3,8 +3,8 @@
 use std::{env, path::PathBuf};
 
 use clap::Args;
+use gyre_client::control::Control;
 use gyre_configuration::terminal::{Failure, print};
-use gyre_stage::control::Control;
 
 /// The run that a command is about.
 #[derive(Debug, Args)]

@@ -8,16 +8,16 @@ use std::{
 };
 
 use clap::Args;
+use gyre_client::{
+    Received,
+    observer::{Next, ObservedRun},
+};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{
     Correction, Fix, Loop, Masked, Message, Motion, MotionEstimate, MotionHeader, Objects, Pose,
     Refined, Rotation, Scan, fix_status,
 };
 use gyre_geometry::xy_yaw;
-use gyre_stage::{
-    observer::{Next, ObservedRun},
-    reader::Received,
-};
 
 use crate::operate::choice::RunChoice;
 

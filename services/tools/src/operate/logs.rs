@@ -3,10 +3,12 @@
 use std::{path::Path, process::ExitCode, time::Duration};
 
 use clap::Args;
-use gyre_configuration::process_names;
-use gyre_configuration::terminal::{Failure, print};
+use gyre_client::{control::Control, wake::Signals};
+use gyre_configuration::{
+    process_names,
+    terminal::{Failure, print},
+};
 use gyre_recording::LogTail;
-use gyre_stage::{control::Control, wake::Signals};
 use serde_json::Value;
 
 use crate::operate::choice::RunChoice;

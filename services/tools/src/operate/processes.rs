@@ -3,13 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use gyre_client::{RunError, UsedRun, control::Control};
 use gyre_configuration::terminal::{Failure, print};
-use gyre_stage::{
-    StageError,
-    control::{Activity, Control, Phase, ProcessStatus, Status},
-    source::Received,
-};
-use gyre_supervise::UsedRun;
+use gyre_contract::control::{Activity, Phase, ProcessStatus, Received, Status};
 
 use crate::operate::choice::RunChoice;
 
@@ -39,7 +35,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
         match run.status() {
             Ok(status) => rows.push(UsedRun::of(status)),
             // It has ended meanwhile.
-            Err(StageError::NotRunning { .. }) => {}
+            Err(RunError::NotRunning { .. }) => {}
             Err(error) => faults.push(error.to_string()),
         }
     }

@@ -4,8 +4,10 @@ use std::{env, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use gyre_configuration::terminal::{Failure, print, words};
-use gyre_contract::run::StageConfig;
-use gyre_stage::control::{PendingSwap, Swap};
+use gyre_contract::{
+    control::{PendingSwap, Swap},
+    run::StageConfig,
+};
 use gyre_supervise::Program;
 
 use crate::operate::choice::{RunChoice, chosen_to_change};

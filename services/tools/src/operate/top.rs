@@ -10,11 +10,11 @@ use std::{
 };
 
 use clap::Args;
-use gyre_configuration::terminal::{Failure, WIDTH, print};
-use gyre_stage::{
+use gyre_client::{
     observer::{ObservedRun, Observer},
     wake::Signals,
 };
+use gyre_configuration::terminal::{Failure, WIDTH, print};
 use ratatui::{
     DefaultTerminal,
     crossterm::event::{self, Event, KeyCode, KeyModifiers},

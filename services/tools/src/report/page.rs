@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use gyre_configuration::difference::keys;
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::{difference::keys, terminal::Failure};
 use gyre_contract::StageId;
 use gyre_geometry::Pose;
-use gyre_results::evaluation::plot::paths_svg;
-use gyre_results::figures::{Figure, GROUPS};
+use gyre_results::{
+    evaluation::plot::paths_svg,
+    figures::{Figure, GROUPS},
+};
 use toml::Table;
 
 use crate::report::{

@@ -9,8 +9,7 @@ use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::read_trajectory;
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
-use gyre_results::evaluation::Evaluation;
-use gyre_results::{SUMMARY, judgement::judge, require_results};
+use gyre_results::{SUMMARY, evaluation::Evaluation, judgement::judge, require_results};
 use serde_json::{Value, json};
 
 pub struct Subject {

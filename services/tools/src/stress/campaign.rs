@@ -2,10 +2,12 @@
 
 use std::{sync::Arc, thread, time::Duration};
 
+use gyre_client::run::{free_shared_memory, sweep};
 use gyre_configuration::terminal::Failure;
-use gyre_contract::StageId;
-use gyre_contract::run::{Limits, RADAR_HZ, Scenario};
-use gyre_stage::run::{free_shared_memory, sweep};
+use gyre_contract::{
+    StageId,
+    run::{Limits, RADAR_HZ, Scenario},
+};
 
 use crate::stress::{
     Report, TestedPipeline,

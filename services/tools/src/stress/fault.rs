@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use gyre_client::clock;
 use gyre_contract::{PoseHeader, StageId};
-use gyre_stage::clock;
 use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rustix::process::{Pid, Signal, kill_process_group};

@@ -10,8 +10,8 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
+use gyre_client::run::end_with;
 use gyre_configuration::terminal::{Failure, own};
-use gyre_stage::run::end_with;
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 

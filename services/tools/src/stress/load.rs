@@ -8,13 +8,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_configuration::terminal::{Failure, print};
-use gyre_contract::topics;
-use gyre_stage::{
+use gyre_client::{
+    memory,
     observer::{ObservedRun, wait_for_any},
     wake::{MAX_WAIT, Signals},
 };
-use gyre_supervise::memory;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::topics;
 
 /// The line that a helper prints when it works.
 pub(super) const READY: &str = "ready";

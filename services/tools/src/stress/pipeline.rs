@@ -9,13 +9,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_configuration::terminal::Failure;
-use gyre_contract::run::{PlayedFault, Scenario};
-use gyre_contract::{Footprint, Pose, PoseHeader, StageId};
-use gyre_stage::{
-    StageError, clock,
+use gyre_client::{
+    RunError, clock,
     observer::{Next, Observer},
 };
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{
+    Footprint, Pose, PoseHeader, StageId,
+    run::{PlayedFault, Scenario},
+};
+use running::Running;
 
 use crate::stress::{
     TestedPipeline,
@@ -26,8 +29,6 @@ use crate::stress::{
     report::Figures,
     witness_fault::{PlayedClock, WitnessFaults},
 };
-
-use running::Running;
 
 /// The time after the measurement during which late poses still count.
 const GRACE: Duration = Duration::from_secs(10);
@@ -131,7 +132,7 @@ fn await_others(
     held: &Weak<()>,
     poses: &mut Observer<'_, Pose>,
     newest: &mut PoseHeader,
-) -> Result<(), StageError> {
+) -> Result<(), RunError> {
     loop {
         if drain(poses, TICK, &mut |pose| *newest = *pose)? {
             // It returns at once when the run has ended.
@@ -148,7 +149,7 @@ fn drain(
     poses: &mut Observer<'_, Pose>,
     mut limit: Duration,
     take: &mut dyn FnMut(&PoseHeader),
-) -> Result<bool, StageError> {
+) -> Result<bool, RunError> {
     loop {
         match poses.next(limit)? {
             Next::Message(pose, _) => take(pose.header()),
@@ -207,7 +208,7 @@ impl Session {
         &mut self,
         poses: &mut Observer<'_, Pose>,
         mut has_ended: impl FnMut() -> bool,
-    ) -> Result<bool, StageError> {
+    ) -> Result<bool, RunError> {
         while !self.is_over() {
             let is_last = drain(poses, TICK, &mut |pose| self.add(pose))?;
             self.poll();

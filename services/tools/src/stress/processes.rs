@@ -9,9 +9,8 @@ use std::{
     time::Instant,
 };
 
+use gyre_client::{ProcessStat, Usage, control::Control};
 use gyre_contract::{FollowerId, StageId};
-use gyre_stage::control::Control;
-use gyre_supervise::{ProcessStat, Usage};
 use serde::Serialize;
 
 /// The resources that the processes of one name used while a run was measured.

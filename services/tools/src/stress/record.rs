@@ -8,8 +8,7 @@ mod distribution;
 
 use std::ops::Range;
 
-use gyre_contract::run::latency::Durations;
-use gyre_contract::{Item, PoseHeader, StageId, WitnessCounts, flag};
+use gyre_contract::{Item, PoseHeader, StageId, WitnessCounts, flag, run::latency::Durations};
 use serde::Serialize;
 
 pub use distribution::Distribution;

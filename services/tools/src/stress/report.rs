@@ -5,8 +5,8 @@ mod outcome;
 
 use std::{fs, path::Path};
 
+use gyre_client::RunError;
 use gyre_configuration::terminal::Failure;
-use gyre_stage::StageError;
 use serde::Serialize;
 
 pub use figures::Figures;
@@ -53,6 +53,6 @@ impl Report {
     pub fn write(&self, out: &Path) -> Result<(), Failure> {
         let path = out.join("report.json");
         let text = serde_json::to_string_pretty(self)?;
-        Ok(fs::write(&path, text).map_err(StageError::file(&path))?)
+        Ok(fs::write(&path, text).map_err(RunError::file(&path))?)
     }
 }

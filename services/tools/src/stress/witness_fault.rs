@@ -1,7 +1,10 @@
 //! Faults of gyro, wheels and radar: the source plays them, and the motions must report them.
 
-use gyre_contract::run::{PlayedFault, PlayedFaultKind, Scenario};
-use gyre_contract::{Basis, PoseHeader, RefinementRecord, StageId, WitnessCounts, flag, wheels};
+use gyre_contract::{
+    Basis, PoseHeader, RefinementRecord, StageId, WitnessCounts, flag,
+    run::{PlayedFault, PlayedFaultKind, Scenario},
+    wheels,
+};
 use serde::Serialize;
 
 use crate::stress::{Others, TestedPipeline};

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use gyre_matching::{RotationConfig, SequentialRotation};
-use gyre_stage::StageError;
+use gyre_stage::RunError;
 use gyre_stages::search::rotation;
 
 fn main() -> ExitCode {
@@ -12,7 +12,7 @@ fn main() -> ExitCode {
         // Gyre's own search, to be replaced by yours.
         let config: RotationConfig = launch.section("rotation")?;
         let mut search = SequentialRotation::new(raster.n, &config)
-            .map_err(|error| StageError::Input(error.to_string()))?;
+            .map_err(|error| RunError::Input(error.to_string()))?;
         rotation::run_with(
             launch,
             Box::new(move |scans| {

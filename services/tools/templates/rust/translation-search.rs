@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use gyre_matching::{TranslationConfig, TranslationSearch};
-use gyre_stage::StageError;
+use gyre_stage::RunError;
 use gyre_stages::search::translation;
 
 fn main() -> ExitCode {
@@ -12,7 +12,7 @@ fn main() -> ExitCode {
         // Gyre's own search, to be replaced by yours.
         let config: TranslationConfig = launch.section("translation")?;
         let mut search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
-            .map_err(|error| StageError::Input(error.to_string()))?;
+            .map_err(|error| RunError::Input(error.to_string()))?;
         translation::run_with(
             launch,
             Box::new(move |scans, rotation| {

@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use gyre_colossus::Address;
-use gyre_contract::StageId;
-use gyre_contract::run::{Mode, PlayedFault, PlayedFrom, Rate, Side, SourceKind, StageConfig};
+use gyre_contract::{
+    StageId,
+    run::{Mode, PlayedFault, PlayedFrom, Rate, Side, SourceKind, StageConfig},
+};
 use gyre_geometry::samples::{GnssKind, GyroKind, WheelsKind};
 use gyre_ros2_messages::Domain;
 use gyre_simulator::OutputFormat;

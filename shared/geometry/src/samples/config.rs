@@ -3,10 +3,10 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::samples::Sample;
 use crate::{
     bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT},
     check_bounds,
+    samples::Sample,
 };
 
 /// Least standard deviation of a scale: an axis leans by up to 8 degrees, in bends and on slopes.

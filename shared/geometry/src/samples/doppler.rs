@@ -7,8 +7,10 @@ use bytemuck::{Pod, Zeroable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::bounds::{SHARE, SettingError, check};
-use crate::samples::{WheelDistance, WheelsConfig};
+use crate::{
+    bounds::{SHARE, SettingError, check},
+    samples::{WheelDistance, WheelsConfig},
+};
 
 /// The velocity of the radar by the Doppler shift of one scan, at the middle of its sweep: along
 /// the axes of the radar, x forward, y left.

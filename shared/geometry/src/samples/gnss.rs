@@ -3,10 +3,10 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::samples::Geographic;
 use crate::{
     bounds::{DELAY, SettingError, check},
     check_bounds,
+    samples::Geographic,
 };
 
 /// Configuration of GNSS: section `[gnss]`.

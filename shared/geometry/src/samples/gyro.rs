@@ -1,7 +1,9 @@
-use crate::Twist;
 use bytemuck::{Pod, Zeroable};
 
-use crate::samples::{GyroConfig, SampleKind, integral::Integrator};
+use crate::{
+    Twist,
+    samples::{GyroConfig, SampleKind, integral::Integrator},
+};
 
 /// The turn of the sensor from one scan to the next by the gyro, counter-clockwise.
 #[repr(C)]

@@ -3,10 +3,10 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::samples::{Sample, WheelsKind};
 use crate::{
     bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT, check},
     check_bounds,
+    samples::{Sample, WheelsKind},
 };
 
 /// Configuration of the wheels' speed: section `[wheels]`.

@@ -2,8 +2,10 @@
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::MaskerError;
-use gyre_matching::odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError};
-use gyre_matching::{Refiner, SettingError};
+use gyre_matching::{
+    Refiner, SettingError,
+    odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError},
+};
 use gyre_radar::{
     OwnedScan, PointExtractor, PolarScan, Sense,
     scan::{ScanError, flag},

@@ -13,15 +13,14 @@ pub(crate) mod turns;
 pub use found::GyroCalibration;
 pub(crate) use found::log_keys;
 
-use gyre_geometry::samples::Sample;
-use gyre_geometry::wrap_angle;
-use thiserror::Error;
-
-use crate::{Drive, Track};
 use angles::Angles;
 use fit::Fit;
+use gyre_geometry::{samples::Sample, wrap_angle};
 use search::{MIN_TURNS, NoPeak};
+use thiserror::Error;
 use turns::turns;
+
+use crate::{Drive, Track};
 
 /// Offsets of the clocks that are looked at, s: UTC and GPS time are 18 s apart, UTC and TAI 37 s,
 /// and the two clocks of a recording of RADIATE 64 s.

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use gyre_radar::fourier::{Complex32, FftDirection};
 
-use crate::fft::{BLOCK, Columns, RowPass, Transform};
-use crate::kernels;
+use crate::{
+    fft::{BLOCK, Columns, RowPass, Transform},
+    kernels,
+};
 
 /// Correlates real images, two at a time, with a kept one.
 ///

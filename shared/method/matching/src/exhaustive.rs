@@ -4,23 +4,25 @@ mod config;
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
+use config::AngleGrid;
 use gyre_geometry::wrap_angle;
 use nalgebra::{Rotation2, Vector2};
 use ndarray::ArrayView2;
 
-use crate::config::{Overlap, Peak};
-use crate::correlate::KeptCorrelation;
-use crate::covariance::{guess, motion_covariance, shift_covariance};
-use crate::fft::fast_size;
-use crate::overlap::OverlapEnergy;
-use crate::peak::{LinePeak, PlanePeak, line_peak};
-use crate::rotation::{RotationMatch, RotationRunnerUp};
-use crate::scores::{Scores, Shift, reach_cells};
-use crate::translation::{MotionMatch, MotionRunnerUp};
-use crate::warp::Rotation;
-use crate::{SettingError, ShapeError, cells, kernels};
-
-use config::AngleGrid;
+use crate::{
+    SettingError, ShapeError, cells,
+    config::{Overlap, Peak},
+    correlate::KeptCorrelation,
+    covariance::{guess, motion_covariance, shift_covariance},
+    fft::fast_size,
+    kernels,
+    overlap::OverlapEnergy,
+    peak::{LinePeak, PlanePeak, line_peak},
+    rotation::{RotationMatch, RotationRunnerUp},
+    scores::{Scores, Shift, reach_cells},
+    translation::{MotionMatch, MotionRunnerUp},
+    warp::Rotation,
+};
 pub use config::ExhaustiveConfig;
 
 /// Offset of the bilinear lookups from the cells' centres while angles are compared, cells down and

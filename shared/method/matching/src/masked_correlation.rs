@@ -3,9 +3,7 @@ use gyre_simd::simd;
 use nalgebra::{Point2, Vector2};
 use ndarray::ArrayView2;
 
-use crate::scores::check_raster;
-use crate::warp::Rotation;
-use crate::{SettingError, ShapeError, cells};
+use crate::{SettingError, ShapeError, cells, scores::check_raster, warp::Rotation};
 
 /// The masked normalised correlation of two rasters at one motion, over the cells that lie within a
 /// range of both sensors.

@@ -6,9 +6,11 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::config::{Magnitude, RotationConfig};
-use crate::fft::Columns;
-use crate::kernels::{self, Bilinear};
+use crate::{
+    config::{Magnitude, RotationConfig},
+    fft::Columns,
+    kernels::{self, Bilinear},
+};
 
 /// The magnitudes of the band, and the polar grid over them.
 pub(crate) struct PolarGrid {

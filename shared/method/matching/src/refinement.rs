@@ -23,11 +23,13 @@ mod uncertainty;
 mod wheels;
 
 pub use config::{RefinementConfig, RefinementKind};
-use gyre_geometry::samples::{
-    DopplerConfig, DopplerDisplacement, DopplerVelocity, GyroConfig, GyroTurn, WheelDistance,
-    WheelsConfig,
+use gyre_geometry::{
+    OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion,
+    samples::{
+        DopplerConfig, DopplerDisplacement, DopplerVelocity, GyroConfig, GyroTurn, WheelDistance,
+        WheelsConfig,
+    },
 };
-use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
 pub use heading::{GyroBias, Heading, Verdict};
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;

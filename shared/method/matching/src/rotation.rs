@@ -1,20 +1,22 @@
-use std::f64::consts::PI;
-use std::ops::RangeInclusive;
-use std::sync::Arc;
+use std::{f64::consts::PI, ops::RangeInclusive, sync::Arc};
 
 use gyre_radar::fourier::{Complex32, ComplexToReal, RealToComplex};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{RotationConfig, RotationForm};
-use crate::covariance::guess;
-use crate::fft::{RealLines, RealSpectrum, fast_size};
-use crate::peak::line_peak;
-use crate::polar::PolarGrid;
-use crate::scores::check_side;
-use crate::spectrum::PolarSpectrum;
-use crate::whiten::Whitening;
-use crate::{SettingError, ShapeError, cells, kernels, taper};
+use crate::{
+    SettingError, ShapeError, cells,
+    config::{RotationConfig, RotationForm},
+    covariance::guess,
+    fft::{RealLines, RealSpectrum, fast_size},
+    kernels,
+    peak::line_peak,
+    polar::PolarGrid,
+    scores::check_side,
+    spectrum::PolarSpectrum,
+    taper,
+    whiten::Whitening,
+};
 
 /// Distance from the turn of a gyro beyond which a maximum counts as spurious, rad.
 const NEAR_GYRO_RAD: f64 = 4.0 * PI / 180.0;

@@ -3,10 +3,12 @@ use std::sync::Arc;
 use gyre_geometry::{SettingError, check};
 use nalgebra::Vector2;
 
-use crate::config::{METRES, Overlap, Peak};
-use crate::kernels;
-use crate::overlap::OverlapEnergy;
-use crate::peak::{PlanePeak, SUPPORT, plane_peak};
+use crate::{
+    config::{METRES, Overlap, Peak},
+    kernels,
+    overlap::OverlapEnergy,
+    peak::{PlanePeak, SUPPORT, plane_peak},
+};
 
 /// Half width of the neighbourhood where a second maximum counts as the same peak, cells.
 const SAME_PEAK_CELLS: isize = 3;

@@ -3,16 +3,20 @@ use nalgebra::{Matrix3, Rotation2, Vector2};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use crate::config::TranslationConfig;
-use crate::covariance::{guess, motion_covariance, shift_covariance};
-use crate::fft::{PairSpectrum, fast_size};
-use crate::masked_correlation::keep_seen;
-use crate::overlap::OverlapEnergy;
-use crate::peak::PlanePeak;
-use crate::rotation::RotationMatch;
-use crate::scores::{Scores, Shift, reach_cells};
-use crate::warp::Rotation;
-use crate::{SettingError, ShapeError, cells, kernels, whiten};
+use crate::{
+    SettingError, ShapeError, cells,
+    config::TranslationConfig,
+    covariance::{guess, motion_covariance, shift_covariance},
+    fft::{PairSpectrum, fast_size},
+    kernels,
+    masked_correlation::keep_seen,
+    overlap::OverlapEnergy,
+    peak::PlanePeak,
+    rotation::RotationMatch,
+    scores::{Scores, Shift, reach_cells},
+    warp::Rotation,
+    whiten,
+};
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionRunnerUp {

@@ -1,11 +1,12 @@
 //! The velocity by Doppler, as a witness of the way.
 
-use crate::common::{Numbers, scenes::*};
-use gyre_geometry::samples::{
-    DopplerConfig, DopplerKind, DopplerVelocity, GyroConfig, WheelsConfig,
+use gyre_geometry::{
+    SparsePoint, pose,
+    samples::{DopplerConfig, DopplerKind, DopplerVelocity, GyroConfig, WheelsConfig},
 };
-use gyre_geometry::{SparsePoint, pose};
 use gyre_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner};
+
+use crate::common::{Numbers, scenes::*};
 
 const SCANS: usize = 100;
 /// From there on there is nothing but walls, or nothing that matches.

@@ -2,10 +2,13 @@
 
 use std::ops::Range;
 
-use crate::common::scenes::*;
-use gyre_geometry::samples::{DopplerConfig, GyroConfig, WheelsConfig};
-use gyre_geometry::{SparsePoint, pose};
+use gyre_geometry::{
+    SparsePoint, pose,
+    samples::{DopplerConfig, GyroConfig, WheelsConfig},
+};
 use gyre_matching::{Aiding, Outcome, Refined, Verdict};
+
+use crate::common::scenes::*;
 
 const SCANS: usize = 60;
 const WRONG: Range<usize> = 30..33;

@@ -14,18 +14,19 @@ mod sweep_motion;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
+use std::fmt;
+
 use bearing_table::BearingTable;
 use cells::Cells;
-use gyre_geometry::Twist;
-use gyre_geometry::{SettingError, check, check_bounds};
+use gyre_geometry::{SettingError, Twist, check, check_bounds};
 use kernels::locate::{self, Lookup, Taps};
 use ndarray::ArrayViewMut2;
 use polar_image::PolarImage;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fmt;
 use sweep_motion::SweepMotion;
+
+use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 
 pub const MAX_CELLS_PER_SIDE: usize = 4096;

@@ -7,10 +7,9 @@ use std::{f64::consts::TAU, fs, path::Path, time::Duration};
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_matching::RefinementConfig;
-use gyre_slam::estimation::places::Descriptor;
 use gyre_slam::{
     EstimatorKind, Keyframe, LoopCandidate, LoopCloser, LoopOutcome, Place, Query, RecordLog,
-    RecordReader, SUBMAP_REACH_M, TrajectoryEstimator,
+    RecordReader, SUBMAP_REACH_M, TrajectoryEstimator, estimation::places::Descriptor,
 };
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};

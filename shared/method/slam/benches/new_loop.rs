@@ -6,8 +6,7 @@
 #[path = "../tests/estimation/common/mod.rs"]
 mod common;
 
-use std::hint::black_box;
-use std::time::Duration;
+use std::{hint::black_box, time::Duration};
 
 use common::{Drive, ODOMETRY};
 use gyre_slam::estimation::{Constraint, PoseGraph};

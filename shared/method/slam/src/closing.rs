@@ -3,18 +3,22 @@
 
 mod cache;
 
-use crate::estimation::places::{
-    Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
-    neighbours,
-};
-use crate::estimation::{Constraint, EstimationError, GraphOptions, Outcome, PoseGraph};
+use cache::Cache;
 use gyre_geometry::{Pose, UncertainMotion, covariance};
 use gyre_matching::{RefinementConfig, SettingError, Submap};
 use thiserror::Error;
 
-use crate::place::Place;
-use crate::{Keyframe, LoopCandidate, LoopOutcome, Query};
-use cache::Cache;
+use crate::{
+    Keyframe, LoopCandidate, LoopOutcome, Query,
+    estimation::{
+        Constraint, EstimationError, GraphOptions, Outcome, PoseGraph,
+        places::{
+            Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
+            neighbours,
+        },
+    },
+    place::Place,
+};
 
 /// Length of the path between a keyframe and the earlier ones that it is compared with, at least,
 /// m.

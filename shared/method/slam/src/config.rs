@@ -2,9 +2,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::estimation::places::SUBMAP_REACH_M;
-
-use crate::EstimatorKind;
+use crate::{EstimatorKind, estimation::places::SUBMAP_REACH_M};
 
 /// Configuration of SLAM: section `[slam]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
-use crate::estimation::{EstimationError, PoseGraph, Position};
-use gyre_geometry::samples::{GnssConfig, GnssFix};
-use gyre_geometry::{Pose, interpolate};
-use gyre_radar::{ClockOffset, clock_offset};
-use gyre_radar::{Trajectory, median};
+use gyre_geometry::{
+    Pose, interpolate,
+    samples::{GnssConfig, GnssFix},
+};
+use gyre_radar::{ClockOffset, Trajectory, clock_offset, median};
 use nalgebra::{Point2, Vector2};
+
+use crate::estimation::{EstimationError, PoseGraph, Position};
 
 /// The acceleration of vehicles that brake, m/s²: between two keyframes a place is known as well as
 /// if they had moved evenly, but for this.

@@ -1,9 +1,8 @@
 use std::mem;
 
-use crate::estimation::places::KeyframeSelector;
 use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
 
-use crate::Keyframe;
+use crate::{Keyframe, estimation::places::KeyframeSelector};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScanPose {

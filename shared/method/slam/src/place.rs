@@ -1,9 +1,8 @@
-use crate::estimation::places::Descriptor;
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::UncertainMotion;
 use gyre_storage::LogMagic;
 
-use crate::{Record, exact::ExactMotion};
+use crate::{Record, estimation::places::Descriptor, exact::ExactMotion};
 
 /// All that later queries need of a keyframe beside its points.
 #[derive(Clone, Debug, PartialEq)]

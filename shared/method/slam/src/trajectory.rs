@@ -1,13 +1,16 @@
-use crate::estimation::{
-    Constraint, EstimationError, GraphOptions, Kind, Outcome, PoseGraph, TrajectoryFilter, Verdict,
-    WeightedPosition,
-};
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::Matrix3;
 
-use crate::consistency::{DeadReckoning, Speakers};
-use crate::fixes::{Fixes, Stamped};
-use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
+use crate::{
+    Correction, JudgedLoop, Keyframe, LoopVerdict, Query,
+    consistency::{DeadReckoning, Speakers},
+    estimation::{
+        Constraint, EstimationError, GraphOptions, Kind, Outcome, PoseGraph, TrajectoryFilter,
+        Verdict, WeightedPosition,
+    },
+    fixes::{Fixes, Stamped},
+    variance,
+};
 
 /// All loops are judged again when their number has grown by this share of it: that takes time in
 /// proportion to it.

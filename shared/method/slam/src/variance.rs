@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use crate::estimation::{EstimationError, Kind, PoseGraph};
-
-use crate::JudgedLoop;
-use crate::consistency::DeadReckoning;
+use crate::{
+    JudgedLoop,
+    consistency::DeadReckoning,
+    estimation::{EstimationError, Kind, PoseGraph},
+};
 
 /// Lengths of the stretches whose odometry is compared with the corrected poses, in keyframes.
 const LENGTHS: [usize; 9] = [1, 2, 5, 10, 20, 50, 100, 200, 500];

@@ -1,8 +1,10 @@
 //! Fixes of GNSS in the graph: holes, reflections, wrong clocks, and what does not depend on when
 //! they came.
 
-use gyre_geometry::samples::{GnssConfig, GnssFix};
-use gyre_geometry::{Pose, Twist, UncertainMotion, interpolate, pose};
+use gyre_geometry::{
+    Pose, Twist, UncertainMotion, interpolate, pose,
+    samples::{GnssConfig, GnssFix},
+};
 use gyre_slam::{EstimatorKind, FixRefusal, Fixes, Keyframe, TrajectoryEstimator};
 use nalgebra::{Matrix3, Point2, Vector3};
 use rand::SeedableRng;

@@ -6,8 +6,10 @@ use std::f64::consts::PI;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_matching::RefinementConfig;
-use gyre_slam::localisation::{Localisation, Localiser, Map, Observation, Status};
-use gyre_slam::{Keyframe, RecordLog};
+use gyre_slam::{
+    Keyframe, RecordLog,
+    localisation::{Localisation, Localiser, Map, Observation, Status},
+};
 use nalgebra::{Matrix3, Point2};
 
 const REACH_M: f64 = 90.0;

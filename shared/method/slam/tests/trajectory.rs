@@ -1,12 +1,14 @@
 //! The trajectory from odometry and loops, right and wrong ones.
 
-use crate::common::{AROUND, Drive};
 use gyre_geometry::{Pose, UncertainMotion, pose};
-use gyre_slam::estimation::Constraint;
-use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator};
+use gyre_slam::{
+    EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, estimation::Constraint,
+};
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::common::{AROUND, Drive};
 
 const KEYFRAMES: usize = 4 * AROUND;
 

@@ -10,7 +10,7 @@ use std::{
 
 use gyre_contract::run::StageCounters;
 
-use crate::{Manifest, StageError, clock, run};
+use gyre_transport::{Manifest, RunError, clock, run};
 
 fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.root.join(format!("{stage}.counters.json"))
@@ -30,8 +30,8 @@ pub(crate) fn write(
     counters: &StageCounters,
     manifest: &Manifest,
     stage: &str,
-) -> Result<(), StageError> {
-    let text = serde_json::to_string(counters).map_err(|e| StageError::Input(e.to_string()))?;
+) -> Result<(), RunError> {
+    let text = serde_json::to_string(counters).map_err(|e| RunError::Input(e.to_string()))?;
     run::write(path_of(manifest, stage), &text)
 }
 

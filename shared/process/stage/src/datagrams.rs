@@ -6,15 +6,15 @@ use std::{
     os::fd::AsRawFd,
 };
 
-use crate::StageError;
+use gyre_transport::RunError;
 
 pub(crate) const MAX_DATAGRAM: usize = 65_536;
 
-pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSocket, StageError> {
+pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSocket, RunError> {
     let bound = UdpSocket::bind(address);
     let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
     opened.map_err(|error| {
-        StageError::Input(format!(
+        RunError::Input(format!(
             "cannot receive the {what} at {address} ({section}.listen): {error}"
         ))
     })
@@ -31,7 +31,7 @@ pub(crate) fn receive(
     socket: &UdpSocket,
     datagram: &mut [u8],
     left: &mut usize,
-) -> Result<Option<usize>, StageError> {
+) -> Result<Option<usize>, RunError> {
     match (*left > 0).then(|| socket.recv(datagram)) {
         None => Ok(None),
         Some(Ok(bytes)) => {
@@ -39,7 +39,7 @@ pub(crate) fn receive(
             Ok(Some(bytes))
         }
         Some(Err(error)) if matches!(error.kind(), WouldBlock | Interrupted) => Ok(None),
-        Some(Err(error)) => Err(StageError::transport("receive datagrams", error)),
+        Some(Err(error)) => Err(RunError::transport("receive datagrams", error)),
     }
 }
 

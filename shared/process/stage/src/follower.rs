@@ -2,14 +2,15 @@
 //! observers. No stage waits for it, and it gives no credit. An event wakes it when a log has
 //! grown; as events can be lost, it looks every 200 ms.
 
+use gyre_transport::services::LogId;
 use std::{thread, time::Duration};
 
-use gyre_contract::{Header, Item, Message};
+use gyre_contract::{Header, Item, Message, run::StageCounters};
 
-pub use crate::transport::Notifier;
-use crate::{
-    Launch, Listener, Manifest, StageCounters, StageError,
-    counters::Work,
+use crate::{Launch, counters::Work};
+pub use gyre_transport::transport::Notifier;
+use gyre_transport::{
+    Listener, Manifest, RunError,
     numbers::{self, Numbers},
     wake,
     writer::Writer,
@@ -18,24 +19,6 @@ use crate::{
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;
 
-gyre_contract::named! {
-    /// A log of a run that followers read; its name is the event of its growth.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum LogId {
-        Keyframes = "keyframes_grown",
-        Loops = "loops_grown",
-        /// All scans with their points, by pose-integration.
-        Scans = "scans_grown",
-    }
-}
-
-impl LogId {
-    /// Opens the event that wakes the followers of the log, as the one process that appends to it.
-    pub fn growth(self, launch: &Launch) -> Result<Notifier, StageError> {
-        Notifier::open(&launch.node, self.name())
-    }
-}
-
 pub trait Follower {
     type Output: Message;
     /// The logs whose growth wakes it.
@@ -43,10 +26,10 @@ pub trait Follower {
 
     /// Works on the next records of the logs. A step should be short: requests to stop are looked
     /// for between two steps.
-    fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
+    fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, RunError>;
 
     /// Makes its writes survive a power failure. A failure is found by nobody after the process.
-    fn sync(&mut self) -> Result<(), StageError> {
+    fn sync(&mut self) -> Result<(), RunError> {
         Ok(())
     }
 
@@ -63,7 +46,7 @@ pub enum Step<H> {
 }
 
 /// Runs a follower to the end of its logs, or until SIGTERM.
-pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
+pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     // Only latency depends on it.
     let _ = rustix::process::nice(NICENESS);
@@ -118,7 +101,7 @@ impl<M: Message> Flow<M> {
     fn step<F: Follower<Output = M>>(
         &mut self,
         follower: &mut F,
-    ) -> Result<Step<M::Header>, StageError> {
+    ) -> Result<Step<M::Header>, RunError> {
         let work = Work::begin();
         let mut step = follower.step()?;
         if let Step::Worked(message) = &mut step {

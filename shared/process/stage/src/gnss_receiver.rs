@@ -15,10 +15,8 @@ use std::{
 
 use gyre_storage::{File, GroupSync, StorageError};
 
-use crate::{
-    StageError,
-    datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive},
-};
+use crate::datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive};
+use gyre_transport::RunError;
 
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
 /// The row of a line that is no fix: readers of the log count it.
@@ -33,7 +31,7 @@ const WAIT: Duration = Duration::from_millis(50);
 /// Receives fixes in a thread of its own, so that no fix waits while the trajectory is solved, and
 /// appends a row for each line of a datagram, in the order of arrival.
 pub struct GnssReceiver {
-    thread: Option<JoinHandle<Result<(), StageError>>>,
+    thread: Option<JoinHandle<Result<(), RunError>>>,
     shared: Arc<Shared>,
     read: Option<u64>,
 }
@@ -54,11 +52,11 @@ impl Shared {
 
 impl GnssReceiver {
     /// Receives at an address, and continues the log if there is one.
-    pub fn open(address: &str, log: &Path) -> Result<Self, StageError> {
+    pub fn open(address: &str, log: &Path) -> Result<Self, RunError> {
         let socket = listen("fixes of GNSS", "gnss", address)?;
         let log = Log::open(log)?;
         let timeout = socket.set_read_timeout(Some(WAIT));
-        timeout.map_err(|error| StageError::transport("receive fixes", error))?;
+        timeout.map_err(|error| RunError::transport("receive fixes", error))?;
         let shared = Arc::new(Shared {
             ends: AtomicBool::new(false),
             datagrams: Mutex::new(0),
@@ -82,7 +80,7 @@ impl GnssReceiver {
 
     /// Returns what `read` makes of the log, which meanwhile does not change; `None` if it has not
     /// grown since the last call.
-    pub fn if_grown<T>(&mut self, read: impl FnOnce() -> T) -> Result<Option<T>, StageError> {
+    pub fn if_grown<T>(&mut self, read: impl FnOnce() -> T) -> Result<Option<T>, RunError> {
         if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             self.finish()?;
         }
@@ -92,15 +90,12 @@ impl GnssReceiver {
     }
 
     /// Takes all received datagrams, and ends reception: the log does not change any more.
-    pub fn finish(&mut self) -> Result<(), StageError> {
+    pub fn finish(&mut self) -> Result<(), RunError> {
         self.shared.ends.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(ended)) => ended,
-            Some(Err(_)) => Err(StageError::transport(
-                "receive fixes",
-                "the thread has ended",
-            )),
+            Some(Err(_)) => Err(RunError::transport("receive fixes", "the thread has ended")),
         }
     }
 }
@@ -156,8 +151,8 @@ struct Reception {
 }
 
 impl Reception {
-    fn run(mut self) -> Result<(), StageError> {
-        let failed = |error: io::Error| StageError::transport("receive fixes", error);
+    fn run(mut self) -> Result<(), RunError> {
+        let failed = |error: io::Error| RunError::transport("receive fixes", error);
         let mut datagram = vec![0; MAX_DATAGRAM];
         let mut has_arrived = false;
         self.socket.set_nonblocking(false).map_err(failed)?;
@@ -196,7 +191,7 @@ impl Reception {
         }
     }
 
-    fn append(&mut self, datagram: &[u8]) -> Result<(), StageError> {
+    fn append(&mut self, datagram: &[u8]) -> Result<(), RunError> {
         let lines = lines(datagram).filter(|line| !line.trim().is_empty());
         let mut rows = String::new();
         if self.since.elapsed() >= OF {

@@ -3,8 +3,9 @@
 
 use gyre_contract::{Item, Masked, Message, Pair, flag};
 
-use crate::{
-    Launch, StageError,
+use crate::Launch;
+use gyre_transport::{
+    RunError,
     reader::{Reader, Received},
     transport::Listener,
 };
@@ -25,8 +26,8 @@ pub trait Inputs: Sized {
     where
         Self: 'a;
 
-    fn open(launch: &Launch) -> Result<Self, StageError>;
-    fn next_action(&mut self) -> Result<Action, StageError>;
+    fn open(launch: &Launch) -> Result<Self, RunError>;
+    fn next_action(&mut self) -> Result<Action, RunError>;
     /// Returns the inputs of the item of [`Action::Process`].
     fn view(&self) -> Option<Self::View<'_>>;
     fn advance(&mut self);
@@ -58,7 +59,7 @@ impl<M: Message> PairView<'_, M> {
 }
 
 impl PairView<'_, Masked> {
-    pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
+    pub fn rasters(&self) -> Result<Pair<'_>, RunError> {
         let previous = self.previous.map(|it| (it.header(), it.values()));
         let pair = self.current.header().pair(self.current.values(), previous);
         let malformed = || {
@@ -72,11 +73,11 @@ impl PairView<'_, Masked> {
 impl<M: Message> Inputs for Reader<M> {
     type View<'a> = PairView<'a, M>;
 
-    fn open(launch: &Launch) -> Result<Self, StageError> {
-        Self::open(launch, None)
+    fn open(launch: &Launch) -> Result<Self, RunError> {
+        launch.reader(None)
     }
 
-    fn next_action(&mut self) -> Result<Action, StageError> {
+    fn next_action(&mut self) -> Result<Action, RunError> {
         let Some(head) = self.head()? else {
             return Ok(Action::Wait);
         };
@@ -119,14 +120,14 @@ pub struct JoinedView<'a, A: Message, B: Message> {
 impl<A: Message, B: Message> Inputs for Joined<A, B> {
     type View<'a> = JoinedView<'a, A, B>;
 
-    fn open(launch: &Launch) -> Result<Self, StageError> {
+    fn open(launch: &Launch) -> Result<Self, RunError> {
         Ok(Self {
-            pairs: Reader::open(launch, None)?,
-            other: Reader::open(launch, None)?,
+            pairs: launch.reader(None)?,
+            other: launch.reader(None)?,
         })
     }
 
-    fn next_action(&mut self) -> Result<Action, StageError> {
+    fn next_action(&mut self) -> Result<Action, RunError> {
         loop {
             let (Some(a), Some(b)) = (self.pairs.head()?, self.other.head()?) else {
                 return Ok(Action::Wait);

@@ -2,11 +2,22 @@
 
 use std::{
     cell::Cell, collections::BTreeMap, fs, io::Write, os::fd::AsFd, path::PathBuf,
-    process::ExitCode, sync::Mutex, time::Duration,
+    process::ExitCode, time::Duration,
 };
 
-use gyre_contract::FollowerId;
-use gyre_contract::run::{RunConfig, StageConfig};
+use gyre_contract::{
+    FollowerId, Message,
+    run::{RunConfig, StageConfig, StageCounters},
+};
+use gyre_transport::{
+    Manifest, RunError,
+    heartbeat::HeartbeatWriter,
+    log::start_log,
+    reader::{Port, Reader},
+    run,
+    transport::Node,
+    wake::{self, Signals},
+};
 use rustix::{
     io::{Errno, ioctl_fionbio},
     mm::{MlockAllFlags, mlockall},
@@ -14,19 +25,8 @@ use rustix::{
 };
 use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
-use tracing_subscriber::{filter::Targets, prelude::*};
 
-use crate::{
-    Manifest, StageCounters, StageError, counters,
-    heartbeat::HeartbeatWriter,
-    manifest, run,
-    transport::Node,
-    wake::{self, Signals},
-};
-
-/// The filter of the log unless `GYRE_LOG` has another. The network layers of a link and of DDS
-/// report each attempt to connect, each peer.
-const FILTER: &str = "info,zenoh=error,rustdds=error,ros2_client=error";
+use crate::counters;
 
 /// The environment of a stage: its run, its configuration, and its node in the transport.
 pub struct Launch {
@@ -40,9 +40,9 @@ pub struct Launch {
 }
 
 impl Launch {
-    pub fn from_environment(name: &str) -> Result<Self, StageError> {
+    pub fn from_environment(name: &str) -> Result<Self, RunError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| {
-            StageError::Input(
+            RunError::Input(
                 "this is one process of a run, and GYRE_RUN is not set: start the run with `gyre run CONFIG`"
                     .to_owned(),
             )
@@ -52,10 +52,10 @@ impl Launch {
         let manifest = Manifest::read(&PathBuf::from(root))?;
         let log = start_log(&manifest, name)?;
         let path = manifest.root.join("config.toml");
-        let text = fs::read_to_string(&path).map_err(StageError::file(&path))?;
+        let text = fs::read_to_string(&path).map_err(RunError::file(&path))?;
         let configuration = text
             .parse()
-            .map_err(|error: toml::de::Error| StageError::manifest(&path, error.message()))?;
+            .map_err(|error: toml::de::Error| RunError::manifest(&path, error.message()))?;
         let signals = Signals::install()?;
         let node = manifest.transport()?.join(name)?;
         Ok(Self {
@@ -71,11 +71,11 @@ impl Launch {
 
     /// Takes this process's place in the run, after loading its data, and before opening its topics
     /// or output files. A process that stands by waits here until the one before it has ended (see
-    /// [`run::STANDBY`]). [`StageError::Stopped`] on a request to stop.
+    /// [`run::STANDBY`]). [`RunError::Stopped`] on a request to stop.
     ///
     /// The loops of this crate call it. A stage with files of its own calls it before it opens
     /// them; once is enough.
-    pub fn take_place(&self) -> Result<(), StageError> {
+    pub fn take_place(&self) -> Result<(), RunError> {
         if self.has_place.get() {
             return Ok(());
         }
@@ -91,14 +91,14 @@ impl Launch {
         Ok(())
     }
 
-    pub(crate) fn begin_heartbeat(&self) -> Result<(), StageError> {
+    pub(crate) fn begin_heartbeat(&self) -> Result<(), RunError> {
         let heartbeat = HeartbeatWriter::create(&self.manifest, &self.name)?;
         self.signals.report_to(heartbeat);
         Ok(())
     }
 
-    fn stand_by(&self) -> Result<(), StageError> {
-        let failed = |error: Errno| StageError::transport("read standard input", error);
+    fn stand_by(&self) -> Result<(), RunError> {
+        let failed = |error: Errno| RunError::transport("read standard input", error);
         let input = std::io::stdin();
         ioctl_fionbio(&input, true).map_err(failed)?;
         run::write(run::ready_file(&self.manifest.root, &self.name), "")?;
@@ -112,13 +112,13 @@ impl Launch {
             let signals = &self.signals;
             let woken = signals.wait_or_readable(&[], &[], input, wake::MAX_WAIT)?;
             if woken.stop {
-                return Err(StageError::Stopped);
+                return Err(RunError::Stopped);
             }
         }
     }
 
     /// Keeps all memory of this process from being paged out, if the configuration asks for it.
-    fn lock_memory(&self) -> Result<(), StageError> {
+    fn lock_memory(&self) -> Result<(), RunError> {
         let is_follower = FollowerId::by_name(&self.name).is_some();
         let run: RunConfig = self.section("run")?;
         // Followers have their own settings alone.
@@ -127,29 +127,39 @@ impl Launch {
             return Ok(());
         }
         mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| {
-            StageError::Input(format!(
+            RunError::Input(format!(
                 "scheduling.lock_memory is set, but the memory cannot be locked: {error}; raise `ulimit -l`, or LimitMEMLOCK of the unit"
             ))
         })
     }
 
-    fn own_section(&self) -> Result<StageConfig, StageError> {
+    /// Subscribes to a topic, of which `next` is the first item wanted; `None` takes whichever
+    /// arrives first.
+    pub fn reader<M: Message>(&self, next: Option<u64>) -> Result<Reader<M>, RunError> {
+        Reader::open(&self.node, &self.manifest, next)
+    }
+
+    pub fn port<M: Message>(&self) -> Result<Port<M>, RunError> {
+        Port::open(&self.node, &self.manifest)
+    }
+
+    fn own_section(&self) -> Result<StageConfig, RunError> {
         let mut stages: BTreeMap<String, StageConfig> = self.section("stages")?;
         Ok(stages.remove(&self.name).unwrap_or_default())
     }
 
     /// Returns the delay that the configuration adds to the work on each item, to test behaviour
     /// under load.
-    pub(crate) fn delay(&self) -> Result<Duration, StageError> {
+    pub(crate) fn delay(&self) -> Result<Duration, RunError> {
         Ok(Duration::from_millis(self.own_section()?.delay_ms))
     }
 
     /// Returns a section of the run's configuration, or its defaults if the section is missing.
-    pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, StageError> {
+    pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, RunError> {
         let table = self.configuration.get(section).cloned();
         let table = table.unwrap_or_else(|| toml::Table::new().into());
         table.try_into().map_err(|error: toml::de::Error| {
-            StageError::Input(format!(
+            RunError::Input(format!(
                 "[{section}] in the configuration: {}",
                 error.message()
             ))
@@ -167,14 +177,11 @@ fn stands_by() -> bool {
 
 /// Runs a stage as the `main` of its process: joins the run, works until its end, and prints an
 /// error as one sentence.
-pub fn main(
-    name: &str,
-    work: impl FnOnce(&Launch) -> Result<StageCounters, StageError>,
-) -> ExitCode {
+pub fn main(name: &str, work: impl FnOnce(&Launch) -> Result<StageCounters, RunError>) -> ExitCode {
     let result = Launch::from_environment(name).and_then(|launch| {
         tracing::debug!(pid = std::process::id(), "started");
         let counters = match work(&launch) {
-            Err(StageError::Stopped) => StageCounters::default(),
+            Err(RunError::Stopped) => StageCounters::default(),
             worked => worked?,
         };
         counters::write(&counters, &launch.manifest, name)
@@ -191,32 +198,4 @@ pub fn main(
             ExitCode::from(error.exit_code())
         }
     }
-}
-
-fn log_filter() -> Result<Targets, StageError> {
-    let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
-    filter.parse().map_err(|error| {
-        StageError::Input(format!(
-            "GYRE_LOG is `{filter}` ({error}): say `debug`, or `info,zenoh=debug`"
-        ))
-    })
-}
-
-/// Starts logging to `log.jsonl`, where all processes append one line per event. While the returned
-/// span lives, each line carries the name of the stage.
-pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
-    let path = manifest.events();
-    let file = manifest::options()
-        .append(true)
-        .open(&path)
-        .map_err(StageError::file(&path))?;
-    let lines = tracing_subscriber::fmt::layer()
-        .json()
-        // They would be printed to standard error, and panic if that cannot be written either.
-        .log_internal_errors(false)
-        .with_writer(Mutex::new(file))
-        .with_filter(log_filter()?);
-    // A second call in one process (tests) keeps the first log.
-    let _ = tracing_subscriber::registry().with(lines).try_init();
-    Ok(tracing::error_span!("process", stage = name).entered())
 }

@@ -9,7 +9,7 @@ use std::{
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
 };
 
-use crate::StageError;
+use gyre_transport::RunError;
 use ndarray::{Array2, ArrayViewD};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -52,10 +52,10 @@ pub struct Function {
 impl Function {
     /// Starts the interpreter that `GYRE_PYTHON` names, or `python3`, and loads the function of
     /// this name in the file. Another attempt helps where a process was killed or not to be had.
-    pub fn load(file: &Path, name: &str) -> Result<Self, StageError> {
+    pub fn load(file: &Path, name: &str) -> Result<Self, RunError> {
         let absolute = std::path::absolute(file).ok().filter(|file| file.is_file());
         let file = absolute
-            .ok_or_else(|| StageError::Input(format!("there is no file {}", file.display())))?;
+            .ok_or_else(|| RunError::Input(format!("there is no file {}", file.display())))?;
         let python = interpreter();
         let of = file.display();
         let start = |error: std::io::Error| {
@@ -63,8 +63,8 @@ impl Function {
                 "cannot start {python} for {of}: {error}; install Python 3, or name one with GYRE_PYTHON"
             );
             match error.kind() {
-                ErrorKind::NotFound | ErrorKind::PermissionDenied => StageError::Input(sentence),
-                _ => StageError::Transient(sentence),
+                ErrorKind::NotFound | ErrorKind::PermissionDenied => RunError::Input(sentence),
+                _ => RunError::Transient(sentence),
             }
         };
         let mut command = Command::new(&python);
@@ -88,9 +88,9 @@ impl Function {
         };
         match function.answer() {
             Ok(_) => Ok(function),
-            Err(exception @ StageError::Input(_)) => Err(exception),
+            Err(exception @ RunError::Input(_)) => Err(exception),
             Err(ended) => Err(match function.python.try_wait() {
-                Ok(Some(status)) if status.code().is_some() => StageError::Input(format!(
+                Ok(Some(status)) if status.code().is_some() => RunError::Input(format!(
                     "{python} has ended before it had loaded {of}: {status}; name a Python of version 3 with \
                      GYRE_PYTHON, and see that the file does not end it"
                 )),
@@ -99,8 +99,8 @@ impl Function {
         }
     }
 
-    /// Calls the function. An exception is [`StageError::Input`].
-    pub fn call(&mut self, arguments: &[Argument<'_>]) -> Result<Returned, StageError> {
+    /// Calls the function. An exception is [`RunError::Input`].
+    pub fn call(&mut self, arguments: &[Argument<'_>]) -> Result<Returned, RunError> {
         if self.send(arguments).is_err() {
             return Err(self.ended());
         }
@@ -147,23 +147,23 @@ impl Function {
         Some(array)
     }
 
-    /// Reads a line. An exception is [`StageError::Input`]: the file, its line, and Python's
+    /// Reads a line. An exception is [`RunError::Input`]: the file, its line, and Python's
     /// message. The traceback is on standard error.
-    fn answer(&mut self) -> Result<Value, StageError> {
+    fn answer(&mut self) -> Result<Value, RunError> {
         let mut line = String::new();
         let read = self.answers.read_line(&mut line);
         let header = read.ok().and_then(|_| serde_json::from_str(&line).ok());
         let header: Value = header.ok_or_else(|| self.ended())?;
         match header["error"].as_str() {
-            Some(sentence) => Err(StageError::Input(sentence.to_owned())),
+            Some(sentence) => Err(RunError::Input(sentence.to_owned())),
             None => Ok(header),
         }
     }
 
     /// The interpreter was killed while it loaded the file, or has ended in the middle of a call.
-    fn ended(&mut self) -> StageError {
+    fn ended(&mut self) -> RunError {
         let status = self.python.wait().map(|status| status.to_string());
-        StageError::Transient(format!(
+        RunError::Transient(format!(
             "Python has ended while it worked for {}: {}",
             self.file.display(),
             status.unwrap_or_else(|error| error.to_string())

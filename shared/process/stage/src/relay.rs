@@ -3,17 +3,20 @@
 
 use std::os::fd::BorrowedFd;
 
-use gyre_contract::{Item, Message, Motion, MotionHeader, Pose, PoseHeader, Scan, StageId};
-
-use crate::{
-    Launch, StageCounters, StageError, clock, counters,
-    message::{AnyMessage, RecordedMessage},
+use gyre_contract::{
+    Item, Message, Motion, MotionHeader, Pose, PoseHeader, Scan, StageId, run::StageCounters,
+};
+use gyre_transport::{
+    AnyMessage, RecordedMessage, RunError, clock,
     numbers::Numbers,
     reader::{Port, Reader},
-    schedule, sink,
-    source::{Feed, hop},
     wake,
     writer::{TopicWriter, Writer, item_of},
+};
+
+use crate::{
+    Launch, counters, schedule, sink,
+    source::{Feed, hop},
 };
 
 /// Publishes messages of the first stages, which are on another machine, in the place of the
@@ -32,19 +35,22 @@ impl<'a> FirstStages<'a> {
         launch: &'a Launch,
         topics: &[&str],
         reads_motions: bool,
-    ) -> Result<Self, StageError> {
-        let motions = reads_motions.then(|| Reader::open(launch, None));
+    ) -> Result<Self, RunError> {
+        let motions = reads_motions.then(|| launch.reader(None));
         let publishes_scans = topics.contains(&Scan::TOPIC);
         let scans = || Writer::open(&launch.node, &launch.manifest);
         Ok(Self {
             motions: motions.transpose()?,
-            feed: Feed::open(launch, || TopicWriter::of_stream(launch, topics))?.never_late(),
+            feed: Feed::open(launch, || {
+                TopicWriter::of_stream(&launch.node, &launch.manifest, topics)
+            })?
+            .never_late(),
             _scans: (!publishes_scans).then(scans).transpose()?,
         })
     }
 
     /// Reads the new poses. Call it after each sleep.
-    pub fn update(&mut self) -> Result<(), StageError> {
+    pub fn update(&mut self) -> Result<(), RunError> {
         self.feed.credit.update()
     }
 
@@ -62,7 +68,7 @@ impl<'a> FirstStages<'a> {
         self.feed.credit.newest
     }
 
-    pub fn next_motion(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+    pub fn next_motion(&mut self) -> Result<Option<RecordedMessage>, RunError> {
         self.motions.as_mut().map_or(Ok(None), Reader::take_bytes)
     }
 
@@ -78,7 +84,7 @@ impl<'a> FirstStages<'a> {
         &mut self,
         messages: &[Option<RecordedMessage>],
         seq: u64,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         let now_ns = clock::now_ns();
         let mut item = Item {
             due_ns: now_ns,
@@ -94,19 +100,19 @@ impl<'a> FirstStages<'a> {
         self.feed.schedule.has_published(item.published)
     }
 
-    pub fn end(&mut self, item: Item) -> Result<(), StageError> {
+    pub fn end(&mut self, item: Item) -> Result<(), RunError> {
         self.feed.end(item)
     }
 
     /// Sleeps until there is a pose or a motion, or the connection has something to read, and
     /// answers the handshakes of new readers; true on a request to stop.
-    pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, StageError> {
+    pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, RunError> {
         let motions = self.motions.as_ref().map(Reader::listener);
         let slept = self
             .feed
             .sleep_until(motions, Some(connection), wake::MAX_WAIT);
         match slept {
-            Err(StageError::Stopped) => Ok(true),
+            Err(RunError::Stopped) => Ok(true),
             slept => slept.map(|()| false),
         }
     }
@@ -130,7 +136,7 @@ pub struct LastStages<'a> {
 
 impl<'a> LastStages<'a> {
     /// Opens the topics that it publishes. `publishes_motions`: motions come back too.
-    pub fn open(launch: &'a Launch, publishes_motions: bool) -> Result<Self, StageError> {
+    pub fn open(launch: &'a Launch, publishes_motions: bool) -> Result<Self, RunError> {
         let (node, manifest) = (&launch.node, &launch.manifest);
         let motions = publishes_motions.then(|| Writer::open(node, manifest));
         Ok(Self {
@@ -145,7 +151,7 @@ impl<'a> LastStages<'a> {
 
     /// Publishes the last poses again. The newest pose determines where the source continues;
     /// without any pose, the source begins.
-    pub fn republish(&self, restored: &[PoseHeader]) -> Result<(), StageError> {
+    pub fn republish(&self, restored: &[PoseHeader]) -> Result<(), RunError> {
         sink::republish(&self.poses, restored, StageId::PoseIntegration)
     }
 
@@ -153,7 +159,7 @@ impl<'a> LastStages<'a> {
         Pose::sizes(&self.launch.manifest.window).history
     }
 
-    pub fn read(&mut self, topics: &[&str]) -> Result<(), StageError> {
+    pub fn read(&mut self, topics: &[&str]) -> Result<(), RunError> {
         let inlets = topics.iter().map(|topic| inlet(self.launch, topic));
         self.inlets = inlets.collect::<Result<_, _>>()?;
         Ok(())
@@ -161,17 +167,17 @@ impl<'a> LastStages<'a> {
 
     /// Returns the next message of one of these topics, by its place among them; `None` if nothing
     /// has arrived yet.
-    pub fn receive(&mut self, topic: usize) -> Result<Option<RecordedMessage>, StageError> {
+    pub fn receive(&mut self, topic: usize) -> Result<Option<RecordedMessage>, RunError> {
         let inlet = self.inlets.get_mut(topic);
         inlet.map_or(Ok(None), Reader::take_bytes)
     }
 
     /// Reports the number of items whose poses the other machine owes, counted at the source.
-    pub fn has_handed_over(&mut self, items: u64) -> Result<(), StageError> {
+    pub fn has_handed_over(&mut self, items: u64) -> Result<(), RunError> {
         self.progress.write([items])
     }
 
-    pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), StageError> {
+    pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), RunError> {
         let item = &pose.item;
         let hop = item.hops[StageId::PoseIntegration as usize];
         counters::record(&mut self.counters, 0, hop.finished_ns - hop.started_ns);
@@ -179,11 +185,11 @@ impl<'a> LastStages<'a> {
         self.poses.publish(sink::newest(pose), hop)
     }
 
-    pub fn end(&self, item: Item) -> Result<(), StageError> {
+    pub fn end(&self, item: Item) -> Result<(), RunError> {
         self.poses.end(item, Some(StageId::PoseIntegration))
     }
 
-    pub fn publish_motion(&self, motion: MotionHeader) -> Result<(), StageError> {
+    pub fn publish_motion(&self, motion: MotionHeader) -> Result<(), RunError> {
         match &self.motions {
             Some(motions) => motions.publish(motion, None),
             None => Ok(()),
@@ -192,7 +198,7 @@ impl<'a> LastStages<'a> {
 
     /// Sleeps until a topic has a message or the connection has something to read, and answers the
     /// handshakes of new readers; true on a request to stop.
-    pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, StageError> {
+    pub fn sleep(&mut self, connection: BorrowedFd<'_>) -> Result<bool, RunError> {
         let data: Vec<_> = self.inlets.iter().map(Reader::listener).collect();
         let motions = self.motions.as_ref().map(|motions| motions.listener());
         let handshakes: Vec<_> = [self.poses.listener()].into_iter().chain(motions).collect();
@@ -213,9 +219,9 @@ impl<'a> LastStages<'a> {
     }
 }
 
-fn inlet(launch: &Launch, name: &str) -> Result<Reader<AnyMessage>, StageError> {
+fn inlet(launch: &Launch, name: &str) -> Result<Reader<AnyMessage>, RunError> {
     let topic = gyre_contract::topic(name)
-        .ok_or_else(|| StageError::Input(format!("no stage publishes the topic `{name}`")))?;
+        .ok_or_else(|| RunError::Input(format!("no stage publishes the topic `{name}`")))?;
     // Whichever item comes first: after a restart that is one of the history.
     let port = Port::to(topic, &launch.node, &launch.manifest)?;
     Ok(Reader::of(port, None))

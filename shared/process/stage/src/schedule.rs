@@ -5,8 +5,8 @@
 //!
 //! And the progress of stages on another machine: while those owe something, nobody here does.
 
-use crate::{
-    Manifest, StageError, clock,
+use gyre_transport::{
+    Manifest, RunError, clock,
     numbers::{self, Numbers},
 };
 
@@ -39,7 +39,7 @@ pub(crate) struct ScheduleWriter {
 
 impl ScheduleWriter {
     /// Creates the schedule of a source that has to begin now, maybe after a dead one.
-    pub fn create(manifest: &Manifest) -> Result<Self, StageError> {
+    pub fn create(manifest: &Manifest) -> Result<Self, RunError> {
         let [.., run_ns, sensor_ns]: [u64; 4] =
             numbers::read(&manifest.root.join(FILE)).unwrap_or_default();
         let mut writer = Self {
@@ -55,22 +55,22 @@ impl ScheduleWriter {
         Ok(writer)
     }
 
-    pub fn is_paced_from(&mut self, origin: (i64, i64)) -> Result<(), StageError> {
+    pub fn is_paced_from(&mut self, origin: (i64, i64)) -> Result<(), RunError> {
         self.origin = Some(origin);
         self.write()
     }
 
-    pub fn due_at(&mut self, due_ns: i64) -> Result<(), StageError> {
+    pub fn due_at(&mut self, due_ns: i64) -> Result<(), RunError> {
         self.schedule.due_ns = due_ns;
         self.write()
     }
 
-    pub fn has_published(&mut self, published: u64) -> Result<(), StageError> {
+    pub fn has_published(&mut self, published: u64) -> Result<(), RunError> {
         self.schedule.published = published.saturating_add(1);
         self.write()
     }
 
-    fn write(&mut self) -> Result<(), StageError> {
+    fn write(&mut self) -> Result<(), RunError> {
         let Schedule { published, due_ns } = self.schedule;
         let (run_ns, sensor_ns) = self.origin.unwrap_or_default();
         let times = [due_ns, run_ns, sensor_ns].map(|ns| ns as u64);
@@ -92,7 +92,7 @@ pub fn read(manifest: &Manifest) -> Option<Schedule> {
 const ELSEWHERE: &str = "elsewhere";
 
 /// Begins without the other machine, which has not reported where it continues.
-pub(crate) fn begin_elsewhere(manifest: &Manifest) -> Result<Numbers<1>, StageError> {
+pub(crate) fn begin_elsewhere(manifest: &Manifest) -> Result<Numbers<1>, RunError> {
     let mut file = Numbers::open(manifest, ELSEWHERE)?;
     file.write([u64::MAX])?;
     Ok(file)

@@ -4,17 +4,18 @@ use std::fs;
 
 use gyre_contract::{
     Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, StageId, flag,
+    run::StageCounters,
 };
-
-use crate::{
-    Launch, Manifest, StageCounters, StageError,
-    counters::Work,
+use gyre_transport::{
+    Manifest, RunError,
     reader::{Port, Reader, Received},
     run,
     transport::Listener,
     wake,
     writer::Writer,
 };
+
+use crate::{Launch, counters::Work};
 
 const NOTICE: &str = "notice";
 
@@ -29,18 +30,18 @@ pub trait Sink {
     }
     /// Returns the last poses of the journal, at most `count`, oldest first, and whether the stream
     /// had ended.
-    fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError>;
+    fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), RunError>;
     /// Adds a motion, with its scan if the sink takes scans, journals its pose and returns it.
     fn integrate(
         &mut self,
         motion: &MotionHeader,
         scan: Option<&Received<Masked>>,
-    ) -> Result<PoseHeader, StageError>;
-    fn end(&mut self, item: &Item) -> Result<(), StageError>;
+    ) -> Result<PoseHeader, RunError>;
+    fn end(&mut self, item: &Item) -> Result<(), RunError>;
 }
 
 /// Runs the sink on the motions of the run until SIGTERM.
-pub fn run<S: Sink>(launch: &Launch, sink: &mut S) -> Result<StageCounters, StageError> {
+pub fn run<S: Sink>(launch: &Launch, sink: &mut S) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let poses = Writer::<Pose>::open(&launch.node, &launch.manifest)?;
     let (restored, ended) = sink.restore(Pose::sizes(&launch.manifest.window).history)?;
@@ -56,7 +57,7 @@ pub fn run<S: Sink>(launch: &Launch, sink: &mut S) -> Result<StageCounters, Stag
         poses.end(last.unwrap_or_default(), Some(S::HOP))?;
     }
     let motions = Port::to(topic, &launch.node, &launch.manifest)?;
-    let scans = sink.takes_scans().then(|| Reader::open(launch, Some(next)));
+    let scans = sink.takes_scans().then(|| launch.reader(Some(next)));
     let mut integration = Integration {
         sink,
         poses,
@@ -92,7 +93,7 @@ pub fn notice(manifest: &Manifest) -> Option<String> {
     (!notice.is_empty()).then_some(notice)
 }
 
-pub fn set_notice(manifest: &Manifest, notice: &str) -> Result<(), StageError> {
+pub fn set_notice(manifest: &Manifest, notice: &str) -> Result<(), RunError> {
     run::write(manifest.root.join(NOTICE), notice)
 }
 
@@ -102,7 +103,7 @@ pub(crate) fn republish(
     poses: &Writer<Pose>,
     restored: &[PoseHeader],
     hop: StageId,
-) -> Result<(), StageError> {
+) -> Result<(), RunError> {
     let Some((last, earlier)) = restored.split_last() else {
         let mut base = PoseHeader::default();
         base.item.flags = flag::BASE | flag::SYNC;
@@ -133,7 +134,7 @@ struct Integration<'a, S: Sink> {
 
 impl<S: Sink> Integration<'_, S> {
     /// Integrates all motions in the queue; returns whether there were any.
-    fn drain(&mut self) -> Result<bool, StageError> {
+    fn drain(&mut self) -> Result<bool, RunError> {
         let mut progressed = false;
         while !self.ended {
             let Some(head) = self.motions.head()? else {
@@ -147,7 +148,7 @@ impl<S: Sink> Integration<'_, S> {
                 };
                 let (expected, got) = (motion.item.seq, head.item().seq);
                 if got != expected {
-                    return Err(StageError::gap(Masked::TOPIC, expected, got));
+                    return Err(RunError::gap(Masked::TOPIC, expected, got));
                 }
                 received_ns = received_ns.max(head.received_ns);
                 scan = Some(head);

@@ -7,7 +7,7 @@ mod pace;
 mod playback;
 mod player;
 mod position;
-mod received;
+
 mod sensor;
 
 use std::{
@@ -16,20 +16,20 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_contract::{ScanHeader, StageId, run::SourceConfig};
 use rustix::thread::set_current_timer_slack;
 
-use gyre_contract::run::SourceConfig;
-use gyre_contract::{ScanHeader, StageId};
-
-use crate::{Launch, StageCounters, StageError};
+use crate::Launch;
 pub use feed::Credit;
 pub(crate) use feed::{Feed, hop};
+use gyre_contract::run::StageCounters;
+use gyre_transport::RunError;
 use pace::Pace;
 use playback::Playback;
 
-pub use crate::message::RecordedMessage;
+pub use gyre_transport::RecordedMessage;
 pub use player::run_player;
-pub use received::{LastScan, Received, read as received_of};
+
 pub use sensor::{Arrival, Sensor, run_sensor};
 
 pub trait Source {
@@ -69,7 +69,7 @@ pub fn run(
     launch: &Launch,
     source: &mut impl Source,
     config: &SourceConfig,
-) -> Result<StageCounters, StageError> {
+) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let mut playback = Playback {
         feed: Feed::of_scans(launch)?,
@@ -98,7 +98,7 @@ pub fn open<T>(
     launch: &Launch,
     config: &SourceConfig,
     mut open: impl FnMut() -> Result<T, String>,
-) -> Result<T, StageError> {
+) -> Result<T, RunError> {
     let mut attempts = Attempts::new(config);
     loop {
         match open() {
@@ -106,7 +106,7 @@ pub fn open<T>(
             Err(reason) => attempts.failed(reason)?,
         }
         if launch.signals.sleep(PAUSE)? {
-            return Err(StageError::Stopped);
+            return Err(RunError::Stopped);
         }
     }
 }
@@ -124,14 +124,14 @@ impl Attempts {
         }
     }
 
-    fn failed(&mut self, reason: String) -> Result<(), StageError> {
+    fn failed(&mut self, reason: String) -> Result<(), RunError> {
         if self.first_failure.is_none() {
             tracing::warn!("tried again: {reason}");
         }
         let since = self.first_failure.get_or_insert_with(Instant::now);
         match since.elapsed() < self.retry {
             true => Ok(()),
-            false => Err(StageError::Input(format!(
+            false => Err(RunError::Input(format!(
                 "{reason}, and was tried again for {} s (source.retry_s): is the disk or the network folder still there?",
                 self.retry.as_secs_f64()
             ))),

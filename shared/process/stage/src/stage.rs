@@ -2,14 +2,17 @@
 
 use std::{thread, time::Duration};
 
-use gyre_contract::{Header, Hop, Item, Message};
-
-use crate::{
-    Launch, StageCounters, StageError,
-    counters::Work,
-    inputs::{Action, Inputs},
+use gyre_contract::{Header, Hop, Item, Message, run::StageCounters};
+use gyre_transport::{
+    RunError,
     wake::{self, Signals},
     writer::{Draft, Writer},
+};
+
+use crate::{
+    Launch,
+    counters::Work,
+    inputs::{Action, Inputs},
 };
 
 /// A stage: a function of its inputs. This crate does the waiting, joining, publishing and
@@ -26,7 +29,7 @@ pub trait Stage {
         &mut self,
         input: <Self::Inputs as Inputs>::View<'_>,
         output: &mut Draft<Self::Output>,
-    ) -> Result<(), StageError>;
+    ) -> Result<(), RunError>;
 
     /// Adds the findings from the last processed item to its identity, which all later messages
     /// carry.
@@ -34,7 +37,7 @@ pub trait Stage {
 }
 
 /// Runs a stage until SIGTERM.
-pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, StageError> {
+pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let inputs = S::Inputs::open(launch)?;
     let output = Writer::open(&launch.node, &launch.manifest)?;
@@ -82,7 +85,7 @@ struct Flow<'a, S: Stage> {
 
 impl<S: Stage> Flow<'_, S> {
     /// Processes all items in the queues; returns whether there were any.
-    fn drain(&mut self) -> Result<bool, StageError> {
+    fn drain(&mut self) -> Result<bool, RunError> {
         let mut progressed = false;
         while !self.ended {
             match self.inputs.next_action()? {
@@ -97,12 +100,12 @@ impl<S: Stage> Flow<'_, S> {
         Ok(progressed)
     }
 
-    fn process(&mut self, mut item: Item, received_ns: i64) -> Result<(), StageError> {
+    fn process(&mut self, mut item: Item, received_ns: i64) -> Result<(), RunError> {
         self.require_next(&item)?;
         // The slowest stage finds its queue full again and again, and never waits.
         self.signals.work_begins();
         let mut draft = self.output.loan()?;
-        let missing = || StageError::transport("read the inputs of an item", item.seq);
+        let missing = || RunError::transport("read the inputs of an item", item.seq);
         let view = self.inputs.view().ok_or_else(missing)?;
         let work = Work::begin();
         self.stage.process(view, &mut draft)?;
@@ -120,7 +123,7 @@ impl<S: Stage> Flow<'_, S> {
         self.output.send(draft, S::HOP)
     }
 
-    fn end(&mut self, item: Item) -> Result<(), StageError> {
+    fn end(&mut self, item: Item) -> Result<(), RunError> {
         self.require_next(&item)?;
         self.ended = true;
         self.output.end(item, Some(S::HOP))
@@ -128,14 +131,14 @@ impl<S: Stage> Flow<'_, S> {
 
     /// Requires consecutive output: a gap in its history would stop every reader that restarts on
     /// it.
-    fn require_next(&mut self, item: &Item) -> Result<(), StageError> {
+    fn require_next(&mut self, item: &Item) -> Result<(), RunError> {
         match self
             .last
             .replace(item.seq)
             .map(|last| last.saturating_add(1))
         {
             Some(expected) if item.seq != expected => {
-                Err(StageError::gap(S::Output::TOPIC, expected, item.seq))
+                Err(RunError::gap(S::Output::TOPIC, expected, item.seq))
             }
             _ => Ok(()),
         }

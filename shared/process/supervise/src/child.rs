@@ -8,10 +8,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_contract::StageId;
-use gyre_stage::{
-    Manifest, StageError,
+use gyre_contract::{
+    StageId,
     control::{Activity, ProcessStatus},
+};
+use gyre_transport::{
+    Manifest, RunError,
     heartbeat::{self, Heartbeat},
     run::SHARED_MEMORY,
 };
@@ -32,7 +34,7 @@ pub const RESTART_BACKOFF: Duration = Duration::from_millis(100);
 /// Time for a killed process to end. The kernel holds one that waits for a device, as for a network
 /// folder.
 const KILL_TIMEOUT: Duration = Duration::from_secs(10);
-const PERMANENT: i32 = StageError::PERMANENT as i32;
+const PERMANENT: i32 = RunError::PERMANENT as i32;
 
 pub(crate) struct Child {
     pub plan: StagePlan,

@@ -13,8 +13,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::{
-    Manifest, observer,
+use gyre_client::observer;
+use gyre_transport::{
+    Manifest,
     run::{self, SHARED_MEMORY},
     transport::Transport,
 };
@@ -168,8 +169,9 @@ fn unlink_incomplete_tags(directory: &Path) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use gyre_client::observer::ObservedRun;
     use gyre_contract::Pose;
-    use gyre_stage::{observer::ObservedRun, wake::Signals};
+    use gyre_transport::wake::Signals;
 
     use super::*;
     use crate::{rig::Rig, tests::manifest};

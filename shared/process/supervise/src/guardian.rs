@@ -15,13 +15,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::{run, wake::Signals};
+use gyre_transport::{run, wake::Signals};
 use rustix::{
     io::ioctl_fionbio,
     process::{Pid, RawPid, Signal, getpid, kill_process_group},
 };
 
-use crate::{ProcessStat, SuperviseError, end::ends_within};
+use crate::{SuperviseError, end::ends_within};
+use gyre_client::ProcessStat;
 
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 const PERIOD: Duration = Duration::from_millis(10);

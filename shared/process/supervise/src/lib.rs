@@ -15,10 +15,8 @@ mod end;
 mod followers;
 mod guardian;
 mod log;
-pub mod memory;
 mod plan;
 mod poses;
-mod process_stat;
 mod processes;
 mod program;
 mod recorder;
@@ -35,16 +33,12 @@ mod supervisor;
 mod swaps;
 #[cfg(test)]
 mod tests;
-mod usage;
 mod wake_limit;
 
 pub use child::Death;
 pub use guardian::guard;
 pub use gyre_contract::run::{Ending, Scheduling, Swapped};
-pub use log::last_line;
 pub use plan::{END_TIMEOUT, Event, Plan, StagePlan, Stall, SuperviseError};
-pub use process_stat::ProcessStat;
 pub use program::Program;
 pub use requests::wait;
 pub use supervisor::supervise;
-pub use usage::{Usage, UsedRun};

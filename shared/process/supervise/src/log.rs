@@ -1,5 +1,6 @@
 //! The logs of a run: the output of each stage, and the events of all.
 
+use gyre_client::last_line;
 use std::{
     fs::{self, File, OpenOptions},
     io::{self, PipeReader, PipeWriter, Seek, SeekFrom, Write},
@@ -10,7 +11,7 @@ use std::{
     thread,
 };
 
-use gyre_stage::{Manifest, StageError};
+use gyre_transport::{Manifest, RunError};
 use rustix::{
     event::{PollFd, PollFlags, poll},
     io::{Errno, ioctl_fionbio},
@@ -24,8 +25,6 @@ const BACKGROUND: &str = "gyre";
 
 /// The longest last line that is looked for, bytes.
 const TAIL: usize = 4096;
-/// The line before the frames of a panic.
-const BACKTRACE: &str = "\nstack backtrace:\n";
 
 /// The most bytes taken from a pipe at once: its capacity.
 const BUFFER: usize = 1 << 16;
@@ -51,9 +50,9 @@ struct Collected {
 }
 
 impl Log {
-    pub fn open(manifest: &Manifest, stage: &str) -> Result<Self, StageError> {
+    pub fn open(manifest: &Manifest, stage: &str) -> Result<Self, RunError> {
         let path = path_of(manifest, stage);
-        Self::at(&path).map_err(|source| StageError::File { path, source })
+        Self::at(&path).map_err(|source| RunError::File { path, source })
     }
 
     fn at(path: &Path) -> io::Result<Self> {
@@ -147,20 +146,6 @@ impl Collected {
     }
 }
 
-/// Returns the last line that is not empty: an ended program's own reason. A panic's backtrace, and
-/// notes such as the one on how to get it, give no reason.
-pub fn last_line(text: &str) -> Option<&str> {
-    let is_silent = |line: &str| line.trim().is_empty() || line.starts_with("note: ");
-    let traced = text.rfind(BACKTRACE).filter(|begin| {
-        let frames = &text[begin + BACKTRACE.len()..];
-        frames
-            .lines()
-            .all(|line| is_silent(line) || line.starts_with(' '))
-    });
-    let said = &text[..traced.unwrap_or(text.len())];
-    said.lines().rfind(|line| !is_silent(line))
-}
-
 /// Keeps the logs of a run short where processes append directly.
 pub(crate) fn bound_all(manifest: &Manifest) {
     for path in [manifest.events(), path_of(manifest, BACKGROUND)] {
@@ -226,21 +211,6 @@ mod tests {
         drop(log);
         let written = fs::read_to_string(path).unwrap();
         assert_eq!(written, "first\nsecond\n\nthird and last");
-    }
-
-    #[test]
-    fn a_panic_is_said_by_its_message_with_a_backtrace_and_without() {
-        let said = "begins\nthread 'main' (7) panicked at src/main.rs:3:5:\nit is 18, not 10\n";
-        let note =
-            "note: run with `RUST_BACKTRACE=1` environment variable to display a backtrace\n";
-        let frames =
-            "stack backtrace:\n   0: main\n             at ./src/main.rs:3\nnote: details\n";
-        for ending in ["", note, frames] {
-            let line = last_line(&format!("{said}{ending}")).map(str::to_owned);
-            assert_eq!(line.as_deref(), Some("it is 18, not 10"), "{ending}");
-        }
-        let caught = format!("{said}{frames}cannot open the radar\n");
-        assert_eq!(last_line(&caught), Some("cannot open the radar"));
     }
 
     #[test]

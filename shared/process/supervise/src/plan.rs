@@ -5,9 +5,12 @@ use std::{
     time::Duration,
 };
 
-use gyre_contract::run::{RestartPolicy, Scheduling};
-use gyre_contract::{FollowerId, PoseHeader, StageId};
-use gyre_stage::{Manifest, StageError, follower::Progress};
+use gyre_contract::{
+    FollowerId, PoseHeader, StageId,
+    run::{RestartPolicy, Scheduling},
+};
+use gyre_stage::follower::Progress;
+use gyre_transport::{Manifest, RunError};
 use thiserror::Error;
 
 use crate::program::Program;
@@ -174,7 +177,7 @@ pub enum Stall {
 #[derive(Debug, Error)]
 pub enum SuperviseError {
     #[error(transparent)]
-    Stage(#[from] StageError),
+    Stage(#[from] RunError),
     /// One process cannot be kept alive.
     #[error("{0}")]
     Process(String),

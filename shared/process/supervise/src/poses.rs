@@ -3,10 +3,10 @@
 use std::time::Instant;
 
 use gyre_contract::{Item, Pose, flag};
-use gyre_stage::{
-    Manifest, StageError,
+use gyre_stage::schedule;
+use gyre_transport::{
+    Manifest, RunError,
     reader::{Port, Received},
-    schedule,
 };
 
 use crate::run::Run;
@@ -18,16 +18,16 @@ pub(crate) struct Poses {
 }
 
 impl Poses {
-    pub fn of(run: &Run<'_>) -> Result<Self, StageError> {
+    pub fn of(run: &Run<'_>) -> Result<Self, RunError> {
         Ok(Self {
-            port: Port::on(&run.node, run.manifest())?,
+            port: Port::open(&run.node, run.manifest())?,
             newest: None,
             seen: None,
         })
     }
 
     /// Returns the next new pose, or the end; `None` if nothing has come.
-    pub fn next(&mut self) -> Result<Option<Received<Pose>>, StageError> {
+    pub fn next(&mut self) -> Result<Option<Received<Pose>>, RunError> {
         while let Some(received) = self.port.receive()? {
             let item = *received.item();
             if item.is(flag::END) {

@@ -7,7 +7,7 @@ use std::{
 };
 
 use gyre_contract::PoseHeader;
-use gyre_stage::wake;
+use gyre_transport::wake;
 
 use crate::{
     END_TIMEOUT, Ending, Event, Plan, SuperviseError, child::Child, followers::Followers,

@@ -3,11 +3,9 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::{
-    control::{Activity, ProcessStatus},
-    observer,
-    run::ready_file,
-};
+use gyre_client::observer;
+use gyre_contract::control::{Activity, ProcessStatus};
+use gyre_transport::run::ready_file;
 
 use crate::{
     Ending, Event, SuperviseError,

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gyre_contract::{PoseHeader, StageId};
-use gyre_stage::clock;
+use gyre_transport::clock;
 
 use crate::Plan;
 

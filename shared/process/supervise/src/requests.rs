@@ -2,12 +2,13 @@
 
 use std::{env, path::Path, process};
 
-use gyre_contract::StageId;
-use gyre_stage::{
-    StageError, clock,
+use gyre_contract::{
+    StageId,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
-    schedule, sink,
-    source::received_of,
+};
+use gyre_stage::{schedule, sink};
+use gyre_transport::{
+    RunError, clock, received,
     wake::{MAX_WAIT, Signals},
 };
 
@@ -29,7 +30,7 @@ pub fn wait<T>(
     signals: &Signals,
     mut status: Status,
     mut look: impl FnMut(&mut Status) -> Option<T>,
-) -> Result<Option<T>, StageError> {
+) -> Result<Option<T>, RunError> {
     let socket = ControlSocket::open(root)?;
     loop {
         if let Some(found) = look(&mut status) {
@@ -225,7 +226,7 @@ impl Supervisor<'_> {
             ProcessStatus {
                 is_swapped: child.plan.command != begun.command,
                 restarts: restarts.copied().unwrap_or_default(),
-                received: is_source.then(|| received_of(manifest)).flatten(),
+                received: is_source.then(|| received::read(manifest)).flatten(),
                 ..child.status(&self.run, Activity::Running)
             }
         };

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::clock;
+use gyre_transport::clock;
 
 use crate::{
     Event, Stall, SuperviseError,

@@ -10,9 +10,8 @@ mod recorded;
 use std::{collections::BTreeSet, fs, time::Duration};
 
 use gyre_contract::{StageId, Topic};
-use gyre_stage::{
-    Manifest, StageError,
-    message::AnyMessage,
+use gyre_transport::{
+    AnyMessage, Manifest, RunError,
     reader::Port,
     run::RunRoot,
     services::Services,
@@ -76,7 +75,7 @@ impl<'a> Rig<'a> {
         })
     }
 
-    pub fn create_services(&mut self) -> Result<(), StageError> {
+    pub fn create_services(&mut self) -> Result<(), RunError> {
         self.services = Some(Services::create(&self.node, &self.manifest.window)?);
         Ok(())
     }
@@ -133,11 +132,11 @@ impl<'a> Rig<'a> {
     }
 
     /// Returns a publisher of a topic, in place of the stage that it is of.
-    pub fn feed(&self, topic: &str) -> Result<TopicWriter, StageError> {
+    pub fn feed(&self, topic: &str) -> Result<TopicWriter, RunError> {
         TopicWriter::to(known(topic)?, &self.node, &self.manifest)
     }
 
-    pub fn tap(&self, topic: &str) -> Result<Tap, StageError> {
+    pub fn tap(&self, topic: &str) -> Result<Tap, RunError> {
         Tap::to(known(topic)?, &self.node, &self.manifest)
     }
 
@@ -146,20 +145,20 @@ impl<'a> Rig<'a> {
         services.map_or(0, |services| services.subscribers(topic))
     }
 
-    /// Sleeps until a message may be there or `limit` has passed; [`StageError::Stopped`] on a
+    /// Sleeps until a message may be there or `limit` has passed; [`RunError::Stopped`] on a
     /// request to stop.
-    pub fn sleep(&self, taps: &[&Tap], limit: Duration) -> Result<(), StageError> {
+    pub fn sleep(&self, taps: &[&Tap], limit: Duration) -> Result<(), RunError> {
         let listeners: Vec<_> = taps.iter().map(|tap| tap.listener()).collect();
         match self.signals.wait(&listeners, None, limit)?.stop {
-            true => Err(StageError::Stopped),
+            true => Err(RunError::Stopped),
             false => Ok(()),
         }
     }
 }
 
-fn known(topic: &str) -> Result<&'static Topic, StageError> {
+fn known(topic: &str) -> Result<&'static Topic, RunError> {
     let found = gyre_contract::topic(topic);
-    found.ok_or_else(|| StageError::Input(format!("no stage has a topic `{topic}`")))
+    found.ok_or_else(|| RunError::Input(format!("no stage has a topic `{topic}`")))
 }
 
 impl Process {

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::{
-    Manifest, StageError,
+use gyre_transport::{
+    Manifest, RunError,
     run::close_to_others,
     services::Services,
     transport::{Node, Transport},
@@ -41,7 +41,7 @@ impl<'a> Run<'a> {
         Transport::use_as_global(&manifest.root.join("iox.toml"))?;
         let node = transport.join("supervisor")?;
         close_to_others(&manifest.prefix)
-            .map_err(|e| StageError::transport("close shared memory to other users", e))?;
+            .map_err(|e| RunError::transport("close shared memory to other users", e))?;
         let services = Services::create(&node, &manifest.window)?;
         Ok(Self {
             plan,

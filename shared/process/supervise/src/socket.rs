@@ -11,10 +11,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::{
-    StageError,
-    control::{Answer, Request, SOCKET},
-};
+use gyre_contract::control::{Answer, Request, SOCKET};
+use gyre_transport::RunError;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 /// Time for a client to send its request, and to take the answer. The supervisor does nothing else
@@ -26,7 +24,7 @@ const MAX: usize = 64 << 10;
 pub(crate) struct ControlSocket(UnixListener);
 
 impl ControlSocket {
-    pub fn open(root: &Path) -> Result<Self, StageError> {
+    pub fn open(root: &Path) -> Result<Self, RunError> {
         let path = root.join(SOCKET);
         let listener = UnixListener::bind(&path).and_then(|listener| {
             listener.set_nonblocking(true)?;
@@ -34,7 +32,7 @@ impl ControlSocket {
         });
         match listener {
             Ok(listener) => Ok(Self(listener)),
-            Err(source) => Err(StageError::File { path, source }),
+            Err(source) => Err(RunError::File { path, source }),
         }
     }
 

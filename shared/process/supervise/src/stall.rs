@@ -6,10 +6,8 @@
 use std::time::{Duration, Instant};
 
 use gyre_contract::Item;
-use gyre_stage::{
-    schedule::{self, Schedule},
-    wake,
-};
+use gyre_stage::schedule::{self, Schedule};
+use gyre_transport::wake;
 
 use crate::{Plan, Stall};
 
@@ -214,7 +212,7 @@ impl Looks {
 mod tests {
     use super::*;
     use crate::tests::{FOLLOWER, LIMIT, MASKING, REFINEMENT, SOURCE, plan};
-    use gyre_stage::clock;
+    use gyre_transport::clock;
 
     /// Looks when the heartbeats are due and each of these processes has hung for a time.
     fn found(stalls: &mut Stalls<'_>, hanging: &[usize], time: Duration) -> Found {

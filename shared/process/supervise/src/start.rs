@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_stage::{Manifest, StageError, run, wake::Signals};
+use gyre_transport::{Manifest, RunError, run, wake::Signals};
 use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 
 use crate::{
@@ -118,8 +118,8 @@ impl Starter<'_> {
 /// A request to stop ends the attempts.
 fn with_patience<T>(
     mut start: impl FnMut() -> io::Result<T>,
-    mut pause: impl FnMut(Duration) -> Result<bool, StageError>,
-) -> Result<io::Result<T>, StageError> {
+    mut pause: impl FnMut(Duration) -> Result<bool, RunError>,
+) -> Result<io::Result<T>, RunError> {
     for ms in PAUSES_MS {
         match start() {
             Err(error) if is_temporary(error.kind()) => {}

@@ -6,13 +6,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_contract::flag;
-use gyre_stage::{
-    StageCounters, counters, sink, transport,
+use gyre_contract::{
+    flag,
+    run::{Report, StageCounters},
+};
+use gyre_stage::{counters, sink};
+use gyre_transport::{
+    transport,
     wake::{self, Signals},
 };
-
-use gyre_contract::run::Report;
 
 use crate::{
     Ending, Event, Plan, SuperviseError,

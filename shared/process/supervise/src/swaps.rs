@@ -10,10 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::{
-    control::{Answer, PendingSwap, Swap},
-    run,
-};
+use gyre_contract::control::{Answer, PendingSwap, Swap};
+use gyre_transport::run;
 
 use crate::{
     StagePlan, SuperviseError, Swapped, child::Child, processes::Processes, program::Program,

@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_contract::{FollowerId, Limits, StageId, Window};
-use gyre_stage::Manifest;
+use gyre_transport::Manifest;
 
 use crate::{Plan, StagePlan};
 

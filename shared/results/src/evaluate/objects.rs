@@ -1,18 +1,18 @@
 //! `gyre evaluate --objects`: the objects of a run against true ones.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
-use crate::evaluation::{ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_configuration::terminal::Failure;
 use gyre_datasets::ground_truth::read_trajectory;
 use gyre_geometry::{Pose, pose};
 use gyre_radar::Trajectory;
 use nalgebra::{Matrix2, Point2, Vector2};
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
+use serde::{Deserialize, de::DeserializeOwned};
 
-use crate::table;
+use crate::{
+    evaluation::{ObjectErrors, ObjectScan, TrackedObject, TrueObject, object_errors},
+    table,
+};
 
 /// An object is visible if its strongest echo reaches this many counts, the threshold of the masks.
 const SEEN_COUNTS: f64 = 60.0;

@@ -5,8 +5,11 @@
 //! *required*: vehicles that move, are near and have been seen in some scans. An object that
 //! matches one that is there but not required, as a pedestrian, counts neither for nor against.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::{fmt, ops::Range};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+    ops::Range,
+};
 
 use gyre_objects::assign;
 use nalgebra::{Matrix2, Point2, Vector2};

@@ -2,12 +2,11 @@
 
 use std::{io::Read, path::Path};
 
-use crate::evaluation::TimedMotion;
 use gyre_configuration::terminal::Failure;
 use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
 use serde::Deserialize;
 
-use crate::table;
+use crate::{evaluation::TimedMotion, table};
 
 const COLUMNS: &str =
     "stamp_ns interval_ns x_m y_m yaw_rad cov_xx cov_xy cov_xyaw cov_yy cov_yyaw cov_yawyaw";

@@ -1,10 +1,14 @@
 //! `map.png`: the keyframes at their corrected poses, with the trajectory and its loops.
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::{Failure, print};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
 use gyre_geometry::Pose;
-use gyre_slam::mapping::{Drawing, MapError, MapOptions, legible};
-use gyre_slam::{Keyframe, RecordReader};
+use gyre_slam::{
+    Keyframe, RecordReader,
+    mapping::{Drawing, MapError, MapOptions, legible},
+};
 
 use super::Slam;
 use crate::out::Out;

@@ -1,7 +1,9 @@
 //! `objects.csv`, from the log of the follower that tracks the objects.
 
-use std::fmt::{self, Write};
-use std::path::Path;
+use std::{
+    fmt::{self, Write},
+    path::Path,
+};
 
 use gyre_configuration::terminal::Failure;
 use gyre_journal::objects::LoggedObjects;

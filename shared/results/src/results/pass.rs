@@ -1,16 +1,14 @@
 //! One pass over the journal.
 
-use crate::evaluation::TimedMotion;
 use gyre_configuration::terminal::Failure;
-use gyre_contract::run::latency::LatencyMeter;
-use gyre_contract::{Item, PoseHeader, flag};
+use gyre_contract::{Item, PoseHeader, flag, run::latency::LatencyMeter};
 use gyre_datasets::ground_truth::write_tum_pose;
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_storage::Draft;
 
 use super::{Files, Slam, sketch::Sketch};
-use crate::{odometry, poses, summary::Counter};
+use crate::{evaluation::TimedMotion, odometry, poses, summary::Counter};
 
 /// The most poses that are judged beside a run: they take half a gigabyte, and are 28 hours at
 /// 10 Hz.

@@ -3,21 +3,21 @@
 
 use std::fmt::{self, Write};
 
-use crate::evaluation::{BandSample, Bands, LoopErrors, TruthSigma, loop_errors};
-use gyre_configuration::terminal::Failure;
-use gyre_configuration::{Configuration, gnss_log};
+use gyre_configuration::{Configuration, gnss_log, terminal::Failure};
 use gyre_contract::flag;
 use gyre_datasets::GnssLog;
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_journal as journal;
 use gyre_radar::Trajectory;
-use gyre_slam::estimation::{Constraint, EstimationError, G2o};
 use gyre_slam::{
     Correction, Fixes, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader,
-    TrajectoryEstimator, records_path,
+    TrajectoryEstimator,
+    estimation::{Constraint, EstimationError, G2o},
+    records_path,
 };
 
 use crate::{
+    evaluation::{BandSample, Bands, LoopErrors, TruthSigma, loop_errors},
     out::Out,
     summary::{GnssSummary, SlamSummary},
 };

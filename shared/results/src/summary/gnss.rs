@@ -2,9 +2,7 @@
 
 use gyre_datasets::GnssLog;
 use gyre_geometry::{UncertainMotion, xy_yaw};
-use gyre_slam::estimation::EstimationError;
-use gyre_slam::mapping::Origin;
-use gyre_slam::{FixRefusal, TrajectoryEstimator};
+use gyre_slam::{FixRefusal, TrajectoryEstimator, estimation::EstimationError, mapping::Origin};
 use serde::Serialize;
 use serde_json::{Value, json};
 

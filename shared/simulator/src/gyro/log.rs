@@ -4,10 +4,7 @@ use std::fmt::Write as _;
 
 use gyre_geometry::samples::{Sample, SampleKind};
 
-use super::SimulatedGyroConfig;
-use super::attitude::MeanMotion;
-use super::clock::Clock;
-use super::errors::Errors;
+use super::{SimulatedGyroConfig, attitude::MeanMotion, clock::Clock, errors::Errors};
 use crate::path::Path;
 
 pub(crate) const FILE: &str = "imu.csv";

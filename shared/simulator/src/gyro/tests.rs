@@ -2,13 +2,8 @@
 use gyre_geometry::samples::Sample;
 use nalgebra::Vector3;
 
-use super::attitude::MeanMotion;
-use super::clock::Clock;
-use super::errors::Errors;
-use super::log;
-use super::*;
-use crate::config::SimulationConfig;
-use crate::simulator::Simulator;
+use super::{attitude::MeanMotion, clock::Clock, errors::Errors, log, *};
+use crate::{config::SimulationConfig, simulator::Simulator};
 
 const RATE_HZ: f64 = 100.0;
 

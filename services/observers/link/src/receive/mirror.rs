@@ -1,14 +1,12 @@
 //! The copy of a run of another machine.
 
+use gyre_client::{
+    RecordedMessage, RunError, TopicWriter,
+    observer::Sequence,
+    wake::{MAX_WAIT, Signals},
+};
 use gyre_contract::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
 use gyre_journal::Journal;
-use gyre_stage::{
-    StageError,
-    observer::Sequence,
-    source::RecordedMessage,
-    wake::{MAX_WAIT, Signals},
-    writer::TopicWriter,
-};
 use gyre_supervise::rig::Rig;
 use zenoh::{Session, qos::Priority};
 
@@ -45,7 +43,7 @@ pub(super) struct MirroredTopic {
 }
 
 impl Mirror<'_> {
-    pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, StageError> {
+    pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, RunError> {
         let topic = topic(&offered.name).ok_or_else(|| other_version(ASK_FOR_RUN.1))?;
         let sequence = Sequence::default();
         Ok(MirroredTopic {
@@ -80,26 +78,26 @@ impl Mirror<'_> {
     }
 
     /// Asks for another sender, and continues with it if it sends the same drive.
-    fn find_another_sender(&mut self) -> Result<(), StageError> {
+    fn find_another_sender(&mut self) -> Result<(), RunError> {
         match ASK_FOR_RUN.ask(&self.session, offer_key(&self.link), [])? {
             Some(offer) => self.continue_with(offer),
             None => Ok(()),
         }
     }
 
-    fn continue_with(&mut self, other: RunOffer) -> Result<(), StageError> {
+    fn continue_with(&mut self, other: RunOffer) -> Result<(), RunError> {
         if other.sender == self.offer.sender {
             return Ok(());
         }
         other.topics.iter().try_for_each(require_same)?;
         if !self.is_same_drive(&other)? {
-            return Err(StageError::Input(
+            return Err(RunError::Input(
                 "the sender plays a different drive now: what arrived of this drive is whole up to here; receive the new drive into a different folder".to_owned(),
             ));
         }
         let is_sent = |topic: &MirroredTopic| other.topics.iter().any(|it| it.name == topic.name);
         if let Some(topic) = self.topics.iter().find(|topic| !is_sent(topic)) {
-            return Err(StageError::Input(format!(
+            return Err(RunError::Input(format!(
                 "the sender has begun again and does not send `{}` any more: give it the same --topics",
                 topic.name
             )));
@@ -114,7 +112,7 @@ impl Mirror<'_> {
         Ok(())
     }
 
-    fn is_same_drive(&self, other: &RunOffer) -> Result<bool, StageError> {
+    fn is_same_drive(&self, other: &RunOffer) -> Result<bool, RunError> {
         let properties = |of: &RunOffer| (of.window, of.limits, of.live, of.refines);
         let began_ns = match self.next_pose {
             0 => self.offer.began_ns,
@@ -129,7 +127,7 @@ impl Mirror<'_> {
     }
 
     /// Publishes the messages that arrive until all topics have ended, or a signal arrives.
-    pub fn run(&mut self) -> Result<Received, StageError> {
+    pub fn run(&mut self) -> Result<Received, RunError> {
         let mut connection = ConnectionLog::of("sender");
         let limits = self.rig.manifest().limits;
         loop {
@@ -190,7 +188,7 @@ impl Mirror<'_> {
 
 impl MirroredTopic {
     /// Returns the next message that has arrived, and counts it.
-    fn next_message(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+    fn next_message(&mut self) -> Result<Option<RecordedMessage>, RunError> {
         let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? else {
             return Ok(None);
         };
@@ -207,7 +205,7 @@ fn append(
     message: &RecordedMessage,
     next: u64,
     limits: &Limits,
-) -> Result<u64, StageError> {
+) -> Result<u64, RunError> {
     let pose: Option<PoseHeader> = bytemuck::try_pod_read_unaligned(&message.header).ok();
     let is_new = |pose: &PoseHeader| {
         pose.item.seq == next && !pose.item.is(flag::END) && Pose::check(pose, &[], limits).is_ok()
@@ -215,6 +213,6 @@ fn append(
     let Some(pose) = pose.filter(is_new) else {
         return Ok(next);
     };
-    journal.append(&pose).map_err(StageError::input)?;
+    journal.append(&pose).map_err(RunError::input)?;
     Ok(next + 1)
 }

@@ -5,8 +5,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::RunError;
 use gyre_colossus::Configuration;
-use gyre_stage::StageError;
 use gyre_stages::live_radar::{AskError, Sizes};
 
 use super::{Settings, configuration_estimate::ConfigurationEstimate, driver::Driver};
@@ -24,7 +24,7 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
 
 /// Returns the configuration that the driver publishes, or the one that its azimuths show.
 fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
-    let lasting = |error: StageError| AskError::lasting(error.to_string());
+    let lasting = |error: RunError| AskError::lasting(error.to_string());
     let mut driver = Driver::open(settings).map_err(lasting)?;
     let (mut estimate, started) = (ConfigurationEstimate::default(), Instant::now());
     while started.elapsed() < MAX_WAIT {

@@ -1,5 +1,6 @@
 //! The topics of Navtech's driver.
 
+use gyre_client::{RunError, clock};
 use gyre_colossus::Azimuth;
 use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{
@@ -10,7 +11,6 @@ use gyre_ros2_messages::{
     radar::DescribedRadar,
     sensor_msgs::Imu,
 };
-use gyre_stage::{StageError, clock};
 use ros2_client::{Gid, ReadError, Subscription};
 
 use super::{Settings, fixes::Fixes, wakeups::Wakeups};
@@ -85,7 +85,7 @@ pub struct Driver {
 }
 
 impl Driver {
-    pub fn open(settings: &Settings) -> Result<Self, StageError> {
+    pub fn open(settings: &Settings) -> Result<Self, RunError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
@@ -113,11 +113,11 @@ impl Driver {
     }
 
     /// Returns the type of the azimuths' topic on DDS; `None` while there is no publisher.
-    pub fn found(&self) -> Result<Option<String>, StageError> {
+    pub fn found(&self) -> Result<Option<String>, RunError> {
         match self.node.type_of(&self.dds_name) {
             Some(found) if !names().contains(&found) => {
                 let (topic, names) = (&self.topic, names().join(", "));
-                Err(StageError::Input(format!(
+                Err(RunError::Input(format!(
                     "{topic} carries {found}, but Gyre reads {names}"
                 )))
             }
@@ -126,7 +126,7 @@ impl Driver {
     }
 
     /// Subscribes to the azimuths once there is a publisher; returns whether there is one.
-    pub fn receive(&mut self) -> Result<bool, StageError> {
+    pub fn receive(&mut self) -> Result<bool, RunError> {
         if self.azimuths.is_some() {
             return Ok(true);
         }
@@ -191,7 +191,7 @@ fn packets<M: Ros2Message + Send + 'static>(
     topic: &str,
     depth: usize,
     of: fn(M) -> PacketMessage,
-) -> Result<TakePacket, StageError> {
+) -> Result<TakePacket, RunError> {
     let topic: Subscription<M> = wakeups.subscribe(node, topic, depth, false)?;
     let take = move || -> Result<Option<Packet>, ReadError> {
         let taken = topic.take()?;

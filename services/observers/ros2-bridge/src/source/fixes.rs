@@ -1,11 +1,13 @@
 //! The fixes of a GNSS receiver that is beside the driver.
 
-use std::io;
-use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
+use std::{
+    io,
+    net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket},
+};
 
+use gyre_client::{RunError, clock};
 use gyre_geometry::samples::GnssConfig;
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
-use gyre_stage::{StageError, clock};
 use ros2_client::Subscription;
 
 use super::wakeups::Wakeups;
@@ -30,10 +32,10 @@ impl Fixes {
         node: &mut Node,
         wakeups: &mut Wakeups,
         config: &GnssConfig,
-    ) -> Result<Self, StageError> {
+    ) -> Result<Self, RunError> {
         let failed = |error: io::Error| {
             let listen = &config.listen;
-            StageError::Input(format!(
+            RunError::Input(format!(
                 "cannot pass the fixes of GNSS on to {listen} (gnss.listen): {error}"
             ))
         };

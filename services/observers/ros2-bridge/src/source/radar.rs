@@ -6,13 +6,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_contract::{ScanHeader, StageId};
+use gyre_client::{RunError, clock};
+use gyre_contract::{ScanHeader, StageId, control::Received};
 use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{navtech_msgs::RadarBScanMsg, radar::DescribedRadar};
-use gyre_stage::{
-    StageError, clock,
-    source::{Arrival, Received, Sensor},
-};
+use gyre_stage::source::{Arrival, Sensor};
 use gyre_stages::live_radar::{Intake, NoScans};
 use ros2_client::Gid;
 
@@ -47,7 +45,7 @@ pub struct Radar {
 }
 
 impl Radar {
-    pub fn open(settings: Settings) -> Result<Self, StageError> {
+    pub fn open(settings: Settings) -> Result<Self, RunError> {
         let now = Instant::now();
         Ok(Self {
             intake: Intake::new(settings.constants),
@@ -64,7 +62,7 @@ impl Radar {
         })
     }
 
-    fn take_configuration(&mut self, room: usize) -> Result<(), StageError> {
+    fn take_configuration(&mut self, room: usize) -> Result<(), RunError> {
         for _ in 0..MAX_MESSAGES {
             match self.driver.configuration() {
                 Ok(Some(described)) => self.configure(described, room)?,
@@ -75,10 +73,10 @@ impl Radar {
         Ok(())
     }
 
-    fn configure(&mut self, described: DescribedRadar, room: usize) -> Result<(), StageError> {
+    fn configure(&mut self, described: DescribedRadar, room: usize) -> Result<(), RunError> {
         self.described = Some(described);
         match self.intake.configure(described.radar, room) {
-            Err(error @ NoScans::TooLarge { .. }) => Err(StageError::Input(error.to_string())),
+            Err(error @ NoScans::TooLarge { .. }) => Err(RunError::Input(error.to_string())),
             Err(error @ NoScans::Bad(_)) => {
                 self.intake.damaged(error, 0);
                 Ok(())
@@ -92,7 +90,7 @@ impl Radar {
         packet: Packet,
         header: &mut ScanHeader,
         bytes: &mut [u8],
-    ) -> Result<bool, StageError> {
+    ) -> Result<bool, RunError> {
         if !self.takes(packet.publisher, bytes.len())? {
             return Ok(false);
         }
@@ -140,7 +138,7 @@ impl Radar {
     /// Returns whether this publisher is the one that is received. A different publisher takes its
     /// place when it has fallen silent: the driver was restarted, and its messages do not continue
     /// the scan before.
-    fn takes(&mut self, publisher: Gid, room: usize) -> Result<bool, StageError> {
+    fn takes(&mut self, publisher: Gid, room: usize) -> Result<bool, RunError> {
         let silent = self.last_azimuth.elapsed();
         match self.publisher {
             Some(current) if current == publisher => {}
@@ -173,7 +171,7 @@ impl Radar {
         message: &PacketMessage,
         arrival_ns: i64,
         room: usize,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         self.estimate.add_message(message, arrival_ns);
         let is_due = self.opened.elapsed() >= CONFIGURATION_WAIT;
         let resolution_m = self.settings.constants.range_resolution_m;
@@ -221,7 +219,7 @@ impl Sensor for Radar {
         Some(self.driver.wakeups.descriptor())
     }
 
-    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError> {
+    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, RunError> {
         let is_received = self.driver.receive()?;
         self.driver.wakeups.clear()?;
         if let Some(fixes) = &mut self.driver.fixes {

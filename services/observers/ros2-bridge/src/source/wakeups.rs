@@ -6,8 +6,8 @@ use std::{
     time::Duration,
 };
 
+use gyre_client::RunError;
 use gyre_ros2_messages::Ros2Message;
-use gyre_stage::StageError;
 use ros2_client::{
     Subscription,
     dds::rustdds::mio1::{Events, Interest, Poll, Token},
@@ -24,7 +24,7 @@ pub struct Wakeups {
 }
 
 impl Wakeups {
-    pub fn new() -> Result<Self, StageError> {
+    pub fn new() -> Result<Self, RunError> {
         Ok(Self {
             poll: Poll::new().map_err(failed)?,
             events: Events::with_capacity(CAPACITY),
@@ -38,7 +38,7 @@ impl Wakeups {
         topic: &str,
         depth: usize,
         is_lossy: bool,
-    ) -> Result<Subscription<M>, StageError> {
+    ) -> Result<Subscription<M>, RunError> {
         let mut topic: Subscription<M> = node.subscribe(topic, depth, is_lossy)?;
         // All topics are read after an event of one.
         let registry = self.poll.registry();
@@ -52,7 +52,7 @@ impl Wakeups {
     }
 
     /// Makes it unreadable until the next message. Take all messages after this, and not before.
-    pub fn clear(&mut self) -> Result<(), StageError> {
+    pub fn clear(&mut self) -> Result<(), RunError> {
         match self.poll.poll(&mut self.events, Some(Duration::ZERO)) {
             Err(error) if error.kind() != io::ErrorKind::Interrupted => Err(failed(error)),
             _ => Ok(()),
@@ -60,6 +60,6 @@ impl Wakeups {
     }
 }
 
-fn failed(error: io::Error) -> StageError {
-    StageError::Input(format!("cannot wait for topics of ROS 2: {error}"))
+fn failed(error: io::Error) -> RunError {
+    RunError::Input(format!("cannot wait for topics of ROS 2: {error}"))
 }

@@ -1,9 +1,9 @@
 //! The channels that viewers can subscribe to.
 
 use base64::{Engine, prelude::BASE64_STANDARD};
+use gyre_client::Manifest;
 use gyre_contract::{Message, Pose};
 use gyre_recording::view::{CHANNELS, POINTS, TRAJECTORY};
-use gyre_stage::Manifest;
 use serde_json::{Value, json};
 
 use super::measurements::{HEALTH, LATENCY, health_schema, latency_schema};

@@ -9,6 +9,7 @@ use std::{
 };
 
 use bytemuck::bytes_of;
+use gyre_client::{Received, clock, observer::ObservedRun};
 use gyre_contract::{
     Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
 };
@@ -16,7 +17,6 @@ use gyre_recording::{
     LogTail,
     view::{LOG, POINTS, TRAJECTORY, View, views},
 };
-use gyre_stage::{clock, observer::ObservedRun, reader::Received};
 
 use super::{
     Hub,

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use axum::extract::ws::{Message, WebSocket};
-use gyre_stage::clock;
+use gyre_client::clock;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::time::{self, Instant};

@@ -3,8 +3,8 @@
 
 use std::{fs, path::Path};
 
+use gyre_client::{Manifest, RunError, clock};
 use gyre_recording::{Head, Ledger, Positions, RecordingError, next_part, parts};
-use gyre_stage::{Manifest, StageError, clock};
 
 use crate::recorder::options::{HEALTH, LOG, Options};
 
@@ -20,7 +20,7 @@ pub(crate) fn begin(
     options: &Options,
     manifest: &Manifest,
     topics: &[String],
-) -> Result<Begun, StageError> {
+) -> Result<Begun, RunError> {
     let ledger = options.continues.then(|| Ledger::of(&manifest.out));
     let earlier = ledger.as_ref().map(|ledger| ledger.read(&options.to));
     let earlier = earlier.transpose().map_err(failed)?.flatten();
@@ -36,7 +36,7 @@ pub(crate) fn begin(
     let is_topic = |topic: &&String| *topic != LOG && *topic != HEALTH;
     let file = manifest.root.join("config.toml");
     let configuration =
-        fs::read_to_string(&file).map_err(|source| StageError::File { path: file, source })?;
+        fs::read_to_string(&file).map_err(|source| RunError::File { path: file, source })?;
     let head = Head {
         id: id.unwrap_or_else(new_id),
         part,
@@ -52,7 +52,7 @@ pub(crate) fn begin(
     })
 }
 
-pub fn require_own(file: &Path, out: &Path) -> Result<(), StageError> {
+pub fn require_own(file: &Path, out: &Path) -> Result<(), RunError> {
     match Ledger::of(out).read(file).map_err(failed)? {
         Some(_) => Ok(()),
         None => require_new(file),
@@ -60,19 +60,19 @@ pub fn require_own(file: &Path, out: &Path) -> Result<(), StageError> {
 }
 
 /// A recording that cannot be written, or an earlier part that cannot be read.
-pub(crate) fn failed(error: RecordingError) -> StageError {
-    StageError::Input(format!(
+pub(crate) fn failed(error: RecordingError) -> RunError {
+    RunError::Input(format!(
         "cannot record: {error}; the run continues without a recording"
     ))
 }
 
 /// Checks that a new recording neither overwrites nor continues an existing one, even if only later
 /// parts are left.
-pub fn require_new(file: &Path) -> Result<(), StageError> {
+pub fn require_new(file: &Path) -> Result<(), RunError> {
     let first = parts(file).into_iter().next();
     // Also something else of that name, a folder for instance.
     match first.or(file.exists().then(|| file.to_owned())) {
-        Some(there) => Err(StageError::Input(format!(
+        Some(there) => Err(RunError::Input(format!(
             "{} exists, and a recording is never overwritten: name another file, or remove it",
             there.display()
         ))),

@@ -8,8 +8,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_stage::control::Control;
-use gyre_supervise::UsedRun;
+use gyre_client::{UsedRun, control::Control};
 
 const PERIOD: Duration = Duration::from_secs(1);
 

@@ -8,14 +8,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_contract::{Message, Pose, topic};
-use gyre_recording::{LogTail, SplitWriter};
-use gyre_stage::{
-    Manifest, StageError, clock, launch,
+use gyre_client::{
+    Manifest, RunError, clock, log,
     observer::{ObservedRun, wait_for_any},
     run,
     wake::{MAX_WAIT, Signals},
 };
+use gyre_contract::{Message, Pose, topic};
+use gyre_recording::{LogTail, SplitWriter};
 
 use crate::recorder::{
     begin::{begin, failed},
@@ -71,14 +71,14 @@ impl fmt::Display for Recorded {
     }
 }
 
-pub fn record(options: &Options) -> Result<Recorded, StageError> {
+pub fn record(options: &Options) -> Result<Recorded, RunError> {
     let run = match std::env::var_os(run::ENVIRONMENT) {
         // The supervisor's own: its root is the same for other names of the folder.
         Some(root) if options.continues => ObservedRun::at(Path::new(&root))?,
         _ => ObservedRun::writing_to(&options.out)?,
     };
     let manifest = run.manifest();
-    let _log = launch::start_log(manifest, NAME)?;
+    let _log = log::start_log(manifest, NAME)?;
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
     let begun = begin(options, manifest, &topics)?;
@@ -116,8 +116,7 @@ pub fn record(options: &Options) -> Result<Recorded, StageError> {
     let ended = recorder.run_until_end(&writing);
     let counts: Vec<Counts> = recorder.taps.iter().map(|tap| tap.counts()).collect();
     drop(recorder);
-    let died =
-        |_| StageError::Transient("the thread that writes the recording has ended".to_owned());
+    let died = |_| RunError::Transient("the thread that writes the recording has ended".to_owned());
     writing.join().map_err(died)?.map_err(failed)?;
     ended?;
     let recorded = Recorded { path, counts };
@@ -128,7 +127,7 @@ pub fn record(options: &Options) -> Result<Recorded, StageError> {
     Ok(recorded)
 }
 
-fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, StageError> {
+fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RunError> {
     if named.is_empty() {
         let topics = DEFAULT.into_iter().filter(|name| manifest.has_topic(name));
         let topics = topics.chain([LOG, HEALTH]);
@@ -136,7 +135,7 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, StageErr
     }
     let is_other = |name: &&String| *name != LOG && *name != HEALTH && topic(name).is_none();
     match named.iter().find(is_other) {
-        Some(unknown) => Err(StageError::Input(format!(
+        Some(unknown) => Err(RunError::Input(format!(
             "there is no topic `{unknown}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix, log and health"
         ))),
         None => Ok(named.to_vec()),
@@ -157,7 +156,7 @@ struct Recorder<'run> {
 
 impl Recorder<'_> {
     /// Receives until the run ends, a signal requests a stop, or the other thread has failed.
-    fn run_until_end<T>(&mut self, writing: &JoinHandle<T>) -> Result<(), StageError> {
+    fn run_until_end<T>(&mut self, writing: &JoinHandle<T>) -> Result<(), RunError> {
         loop {
             // Before the queues are emptied: the messages before the end are still there.
             let has_ended = self.run.has_ended();
@@ -176,7 +175,7 @@ impl Recorder<'_> {
         }
     }
 
-    fn take_all(&mut self) -> Result<(), StageError> {
+    fn take_all(&mut self) -> Result<(), RunError> {
         for tap in &mut self.taps {
             tap.drain(&self.queue)?;
         }
@@ -192,7 +191,7 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    fn report_missed(&mut self) -> Result<(), StageError> {
+    fn report_missed(&mut self) -> Result<(), RunError> {
         let missed = self.taps.iter().map(|tap| tap.counts().missed).sum();
         if missed > self.reported && Instant::now() >= self.due {
             let counts = self.taps.iter().map(Tap::counts);

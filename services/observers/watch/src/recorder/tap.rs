@@ -1,12 +1,11 @@
 //! The observers of the topics that are recorded.
 
+use gyre_client::{
+    Listener, RecordedMessage, RunError, clock,
+    observer::{ObservedRun, TopicObserver},
+};
 use gyre_contract::{Correction, Message};
 use gyre_recording::{Incoming, Position};
-use gyre_stage::{
-    Listener, StageError, clock,
-    observer::{ObservedRun, TopicObserver},
-    source::RecordedMessage,
-};
 
 use crate::recorder::queue::{Entry, Sender};
 
@@ -34,7 +33,7 @@ impl<'run> Tap<'run> {
         run: &'run ObservedRun,
         topic: &str,
         expected: Option<Position>,
-    ) -> Result<Option<Self>, StageError> {
+    ) -> Result<Option<Self>, RunError> {
         let Some(mut observer) = run.observe_topic(topic)? else {
             return Ok(None);
         };
@@ -61,14 +60,14 @@ impl<'run> Tap<'run> {
         overwritten + self.dropped
     }
 
-    pub(crate) fn drain(&mut self, queue: &Sender) -> Result<(), StageError> {
+    pub(crate) fn drain(&mut self, queue: &Sender) -> Result<(), RunError> {
         loop {
             match self.observer.take() {
                 Ok(Some(message)) => self.put(message, queue)?,
                 Ok(None) => break,
                 // The stages judge the messages of another program. The next message reports the
                 // gap.
-                Err(error @ StageError::Malformed { .. }) => {
+                Err(error @ RunError::Malformed { .. }) => {
                     tracing::warn!("not recorded: {error}");
                 }
                 Err(error) => return Err(error),
@@ -84,7 +83,7 @@ impl<'run> Tap<'run> {
         Ok(())
     }
 
-    fn put(&mut self, message: RecordedMessage, queue: &Sender) -> Result<(), StageError> {
+    fn put(&mut self, message: RecordedMessage, queue: &Sender) -> Result<(), RunError> {
         let missed = self.missed();
         let item = message.item().unwrap_or_default();
         let incoming = Incoming {

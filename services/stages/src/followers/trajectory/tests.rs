@@ -2,8 +2,10 @@
 
 use std::{f64::consts::TAU, iter::successors, net::UdpSocket};
 
-use gyre_geometry::samples::{Geographic, GnssFix, GnssKind, LocalPlane};
-use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
+use gyre_geometry::{
+    Pose, Twist, UncertainMotion, pose,
+    samples::{Geographic, GnssFix, GnssKind, LocalPlane},
+};
 use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
 use nalgebra::{Matrix3, Vector3};
 

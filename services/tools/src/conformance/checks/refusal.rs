@@ -1,8 +1,8 @@
 //! Inputs that break the contract: the program ends with exit code 3 and a sentence, and sends
 //! nothing about them.
 
+use gyre_client::RunError;
 use gyre_configuration::terminal::Failure;
-use gyre_stage::StageError;
 
 use super::Examination;
 use crate::conformance::{
@@ -60,7 +60,7 @@ impl Examination<'_> {
             .require(Rule::RefusesMalformed, !is_sent, || {
                 format!("it sent item {WRONG}, although its input on `{topic}` had {fault}")
             });
-        let code = i32::from(StageError::TRANSIENT);
+        let code = i32::from(RunError::TRANSIENT);
         let item = format!("an item on `{topic}` with {fault}");
         let breach = match ending {
             None => format!("it continues after {item}"),

@@ -1,14 +1,14 @@
 //! The messages that are fed to a process: its inputs as they are admitted, and the feedback of the
 //! rest of the run to its answers.
 
+use gyre_client::{RunError, clock};
 use gyre_contract::{Message, Pose, flag};
-use gyre_stage::{StageError, clock};
 
 use super::{Pace, Session};
 
 impl Session<'_> {
     /// Sends the feedback of the rest of the run to an item.
-    pub(super) fn answered(&mut self, seq: u64) -> Result<(), StageError> {
+    pub(super) fn answered(&mut self, seq: u64) -> Result<(), RunError> {
         if self.newest.is_some_and(|newest| seq <= newest) || self.pace == Pace::Hold {
             return Ok(());
         }
@@ -20,7 +20,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    pub(crate) fn admit(&mut self) -> Result<(), StageError> {
+    pub(crate) fn admit(&mut self) -> Result<(), RunError> {
         let last = self.reference.end().min(self.until.saturating_sub(1));
         while self.next <= last && self.is_admitted(self.next) {
             self.send_inputs(self.next)?;
@@ -36,7 +36,7 @@ impl Session<'_> {
         }
     }
 
-    pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), StageError> {
+    pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), RunError> {
         if self.harness.topics.copied().is_some() {
             self.sent_ns.entry(seq).or_insert_with(clock::now_ns);
         }
@@ -45,7 +45,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    pub(crate) fn feed(&self, topics: &[&'static str], seq: u64) -> Result<(), StageError> {
+    pub(crate) fn feed(&self, topics: &[&'static str], seq: u64) -> Result<(), RunError> {
         for topic in topics {
             if let Some(message) = self.reference.get(topic, seq) {
                 self.harness.feed(topic, message)?;
@@ -57,7 +57,7 @@ impl Session<'_> {
     /// Publishes the inputs again as after a restart of all stages: the last poses, and of the
     /// items so far only those that a restarted stage may need. Those after them follow as they are
     /// admitted.
-    pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), StageError> {
+    pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), RunError> {
         self.harness.open_feeds()?;
         self.republish_poses(newest_pose)?;
         let look_back = self.harness.rig.manifest().window.look_back as u64;
@@ -66,7 +66,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    fn republish_poses(&mut self, newest: u64) -> Result<(), StageError> {
+    fn republish_poses(&mut self, newest: u64) -> Result<(), RunError> {
         let history = Pose::sizes(&self.harness.rig.manifest().window).history as u64;
         for seq in (newest + 1).saturating_sub(history)..=newest {
             let Some(pose) = self.reference.get(Pose::TOPIC, seq) else {

@@ -7,9 +7,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::{RunError, wake::Signals};
 use gyre_contract::StageId;
 use gyre_journal::checkpoint;
-use gyre_stage::{StageError, wake::Signals};
 use gyre_supervise::SuperviseError;
 
 use crate::conformance::{
@@ -44,7 +44,7 @@ impl<'a> Life<'a> {
     pub fn begin(program: &'a ShadowProgram, signals: &'a Signals) -> Result<Self, SuperviseError> {
         let (candidate, out) = (&program.candidate, program.folder.join("out"));
         if out.exists() {
-            fs::remove_dir_all(&out).map_err(StageError::file(&out))?;
+            fs::remove_dir_all(&out).map_err(RunError::file(&out))?;
         }
         if candidate.stage == StageId::Refinement {
             copy_state(&candidate.manifest.out, &out)?;
@@ -60,7 +60,7 @@ impl<'a> Life<'a> {
     }
 
     /// Answers the handshakes of the process. Returns whether it has opened its topics.
-    pub(crate) fn attend(&mut self) -> Result<bool, StageError> {
+    pub(crate) fn attend(&mut self) -> Result<bool, RunError> {
         self.harness.answer_handshakes()?;
         if !self.is_open && self.harness.has_publisher() {
             self.is_open = true;
@@ -69,12 +69,12 @@ impl<'a> Life<'a> {
         Ok(self.is_open)
     }
 
-    pub(crate) fn take(&self) -> Result<Vec<Sent>, StageError> {
+    pub(crate) fn take(&self) -> Result<Vec<Sent>, RunError> {
         let received = std::iter::from_fn(|| self.harness.receive().transpose());
         received.take(AT_ONCE).collect()
     }
 
-    pub(crate) fn end(&mut self) -> Result<(), StageError> {
+    pub(crate) fn end(&mut self) -> Result<(), RunError> {
         self.harness.terminate();
         let since = Instant::now();
         while self.harness.death().is_none() && since.elapsed() < STOP_TIMEOUT {
@@ -87,7 +87,7 @@ impl<'a> Life<'a> {
 
 impl ShadowProgram {
     /// Appends the output of a life of the program to the file for it.
-    pub(crate) fn keep_output(&self, life: &Life<'_>) -> Result<(), StageError> {
+    pub(crate) fn keep_output(&self, life: &Life<'_>) -> Result<(), RunError> {
         let Some(path) = &self.output else {
             return Ok(());
         };
@@ -96,20 +96,18 @@ impl ShadowProgram {
             let file = fs::OpenOptions::new().create(true).append(true).open(path);
             file?.write_all(&printed)
         });
-        appended.map_err(StageError::file(path))
+        appended.map_err(RunError::file(path))
     }
 }
 
 /// Copies the state of a run's refinement: a refinement that is restarted or swapped in starts with
 /// the same state.
-fn copy_state(run: &Path, out: &Path) -> Result<(), StageError> {
+fn copy_state(run: &Path, out: &Path) -> Result<(), RunError> {
     let (from, to) = (checkpoint::path(run), checkpoint::path(out));
     gyre_storage::create_folder(to.parent().unwrap_or(out))?;
     match fs::copy(&from, to) {
         // A replaced refinement need not have one.
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(StageError::file(&from)(error))
-        }
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(RunError::file(&from)(error)),
         _ => Ok(()),
     }
 }

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use gyre_contract::{StageId, flag};
-use gyre_stage::{
-    Listener, StageError,
+use gyre_client::{
+    Listener, RunError,
     observer::{ObservedRun, TopicObserver},
 };
+use gyre_contract::{StageId, flag};
 use gyre_supervise::rig::Recorded;
 
 use crate::conformance::topics::StageTopics;
@@ -66,7 +66,7 @@ impl<'run> Observation<'run> {
         run: &'run ObservedRun,
         stage: StageId,
         stage_topics: &StageTopics,
-    ) -> Result<Self, StageError> {
+    ) -> Result<Self, RunError> {
         let mut topics = stage_topics.forward.clone();
         topics.push(stage_topics.output);
         if stage == StageId::Masking {
@@ -91,7 +91,7 @@ impl<'run> Observation<'run> {
     }
 
     /// Empties the queues; returns the items that are complete with it.
-    pub(crate) fn take(&mut self) -> Result<Vec<Observed>, StageError> {
+    pub(crate) fn take(&mut self) -> Result<Vec<Observed>, RunError> {
         let mut complete = Vec::new();
         for place in 0..self.observers.len() {
             loop {
@@ -106,7 +106,7 @@ impl<'run> Observation<'run> {
                     }
                     Ok(None) => break,
                     // The run judges the messages of its stages. The item counts as missed.
-                    Err(StageError::Malformed { .. }) => {}
+                    Err(RunError::Malformed { .. }) => {}
                     Err(error) => return Err(error),
                 }
             }

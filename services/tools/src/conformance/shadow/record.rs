@@ -2,10 +2,9 @@
 
 use std::{fs::File, path::Path};
 
+use gyre_client::RunError;
 use gyre_configuration::terminal::Failure;
-use gyre_contract::run::latency::Durations;
-use gyre_contract::{Item, StageId};
-use gyre_stage::StageError;
+use gyre_contract::{Item, StageId, run::latency::Durations};
 use gyre_supervise::rig::Recorded;
 use serde::Serialize;
 
@@ -86,8 +85,8 @@ impl Record {
         stage: StageId,
         topic: &'static str,
         rows: Option<&Path>,
-    ) -> Result<Self, StageError> {
-        let rows = rows.map(|path| File::create(path).map_err(StageError::file(path)));
+    ) -> Result<Self, RunError> {
+        let rows = rows.map(|path| File::create(path).map_err(RunError::file(path)));
         Ok(Self {
             stage,
             topic,

@@ -11,8 +11,8 @@
 //! - refinement needs the state before its first item, because each life begins with that state: it
 //!   is started again.
 
+use gyre_client::RunError;
 use gyre_contract::{Item, Message, Motion, Pose, StageId, flag};
-use gyre_stage::StageError;
 
 use super::observation::{Feedback, Observed};
 use crate::conformance::harness::{Harness, start_of_trajectory};
@@ -79,7 +79,7 @@ impl Renumbering {
         &mut self,
         shadow: &Harness<'_>,
         observed: &Observed,
-    ) -> Result<SentItem, StageError> {
+    ) -> Result<SentItem, RunError> {
         let opens = self.entry(observed) != Entry::Continues;
         let run = observed.seq();
         let number = self.last.map_or(run, |(_, number)| number + 1);
@@ -123,7 +123,7 @@ impl Renumbering {
         shadow: &Harness<'_>,
         observed: &Observed,
         number: u64,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         if self.last.is_none() {
             return send_start(shadow, observed);
         }
@@ -144,7 +144,7 @@ impl Renumbering {
 }
 
 /// Sends the history that masking finds when it starts: the newest pose, and the motions before.
-fn send_start(shadow: &Harness<'_>, observed: &Observed) -> Result<(), StageError> {
+fn send_start(shadow: &Harness<'_>, observed: &Observed) -> Result<(), RunError> {
     for before in &observed.before {
         shadow.feed(Motion::TOPIC, &before.motion)?;
     }

@@ -8,13 +8,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_configuration::terminal::Failure;
-use gyre_contract::StageId;
-use gyre_stage::{
-    Listener, StageError, clock,
+use gyre_client::{
+    Listener, RunError, clock,
     observer::ObservedRun,
     wake::{MAX_WAIT, Signals},
 };
+use gyre_configuration::terminal::Failure;
+use gyre_contract::StageId;
 
 use super::{
     Options,
@@ -28,7 +28,7 @@ use super::{
 const BACKLOG: usize = 16;
 /// The same for a refinement, which cannot skip an item and is restarted instead.
 const BACKLOG_OF_REFINEMENT: usize = 128;
-/// The shortest time between two polls of the run: see [`gyre_stage::observer`].
+/// The shortest time between two polls of the run: see [`gyre_client::observer`].
 const REST: Duration = Duration::from_millis(10);
 /// The same interval while the shadow starts, because its listeners are not notified.
 const STARTING: Duration = Duration::from_millis(5);
@@ -74,7 +74,7 @@ impl<'a> Shadowing<'a> {
         run: &'a ObservedRun,
         signals: &'a Signals,
         record: Record,
-    ) -> Result<Self, StageError> {
+    ) -> Result<Self, RunError> {
         let now = Instant::now();
         let candidate = &program.candidate;
         let (topics, out) = (candidate.topics(), candidate.manifest.out.display());
@@ -125,7 +125,7 @@ impl<'a> Shadowing<'a> {
         is_given_up || (has_ended && (has_answered || !comes_again))
     }
 
-    fn sleep(&self) -> Result<bool, StageError> {
+    fn sleep(&self) -> Result<bool, RunError> {
         let rest = REST.saturating_sub(self.taken.elapsed());
         let is_starting = self.life.as_ref().is_some_and(|life| !life.is_open);
         let shadow = self.life.iter().map(|life| life.harness.output.listener());
@@ -138,7 +138,7 @@ impl<'a> Shadowing<'a> {
         Ok(self.signals.wait(&listeners, None, limit)?.stop)
     }
 
-    fn take(&mut self, at_once: bool) -> Result<(), StageError> {
+    fn take(&mut self, at_once: bool) -> Result<(), RunError> {
         if !at_once && self.taken.elapsed() < REST {
             return Ok(());
         }
@@ -152,7 +152,7 @@ impl<'a> Shadowing<'a> {
         self.bound_backlog()
     }
 
-    fn bound_backlog(&mut self) -> Result<(), StageError> {
+    fn bound_backlog(&mut self) -> Result<(), RunError> {
         let starts_again = self.options.stage == StageId::Refinement && self.life.is_some();
         let limit = match starts_again {
             true => BACKLOG_OF_REFINEMENT,
@@ -230,7 +230,7 @@ impl<'a> Shadowing<'a> {
             .then(|| format!("it has not answered item {seq} within {item_timeout:.0?}"))
     }
 
-    fn fail(&mut self, sentence: String) -> Result<(), StageError> {
+    fn fail(&mut self, sentence: String) -> Result<(), RunError> {
         self.failures += 1;
         let again = match self.failures >= MAX_FAILURES {
             true => "it is not started again",
@@ -241,7 +241,7 @@ impl<'a> Shadowing<'a> {
         self.end_life(BACKOFF)
     }
 
-    fn end_life(&mut self, backoff: Duration) -> Result<(), StageError> {
+    fn end_life(&mut self, backoff: Duration) -> Result<(), RunError> {
         self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
         self.unanswerable = None;
         self.due = Instant::now() + backoff;
@@ -252,7 +252,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Sends the next items: one that has to be answered, and those before it.
-    fn send(&mut self) -> Result<(), StageError> {
+    fn send(&mut self) -> Result<(), RunError> {
         while self.under_way.is_none()
             && let Some(observed) = self.backlog.pop_front()
         {

@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
-use gyre_configuration::terminal::{Failure, print};
-use gyre_configuration::{Configuration, describe_masks_in_process};
+use gyre_configuration::{
+    Configuration, describe_masks_in_process,
+    terminal::{Failure, print},
+};
 use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::Twist;
 use gyre_matching::odometry::{Odometry, Outcome};

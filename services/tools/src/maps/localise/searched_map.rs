@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use gyre_configuration::Configuration;
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_slam::localisation::{Localiser, Map};
 
 use crate::maps::folder;

@@ -5,8 +5,7 @@ use std::{fs, path::Path};
 use gyre_configuration::terminal::Failure;
 use gyre_geometry::Pose;
 use gyre_results::{Content, Out};
-use gyre_slam::mapping::Drawing;
-use gyre_slam::{Keyframe, RecordReader, localisation::FoundKeyframe};
+use gyre_slam::{Keyframe, RecordReader, localisation::FoundKeyframe, mapping::Drawing};
 
 use super::{Lines, MapArguments, MapFormat, placing};
 use crate::maps::{folder, localise::searched_map};

@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use gyre_configuration::terminal::{Failure, print};
-use gyre_slam::estimation::G2o;
-use gyre_slam::localisation::{DriveSearch, Localiser, PlacedDrive};
-use gyre_slam::{Keyframe, RecordReader};
+use gyre_slam::{
+    Keyframe, RecordReader,
+    estimation::G2o,
+    localisation::{DriveSearch, Localiser, PlacedDrive},
+};
 use gyre_storage::StorageError;
 
 /// Corrected keyframes, and the constraints between them.

@@ -1,8 +1,10 @@
 //! A snapshot at a run as a screen, or as text.
 
 use gyre_configuration::terminal::wrap;
-use gyre_contract::run::latency::HopLatency;
-use gyre_stage::control::{Activity, ProcessStatus};
+use gyre_contract::{
+    control::{Activity, ProcessStatus},
+    run::latency::HopLatency,
+};
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},

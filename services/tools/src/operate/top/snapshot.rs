@@ -5,15 +5,14 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_client::{Usage, clock, control::Control, observer::Next};
 use gyre_configuration::terminal::Failure;
-use gyre_contract::run::latency::{Latency, LatencyMeter};
-use gyre_contract::{PoseHeader, SampleRates, StageId, WitnessCounts, flag};
-use gyre_stage::{
-    clock,
-    control::{Control, Status},
-    observer::Next,
+use gyre_contract::{
+    PoseHeader, SampleRates, StageId, WitnessCounts,
+    control::Status,
+    flag,
+    run::latency::{Latency, LatencyMeter},
 };
-use gyre_supervise::Usage;
 
 use super::{Poses, Scans};
 

@@ -9,16 +9,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_configuration::terminal::Failure;
-use gyre_contract::run::Scenario;
-use gyre_contract::{Pose, PoseHeader};
-use gyre_stage::{
-    StageError,
+use gyre_client::{
+    RunError, last_line,
     observer::{ObservedRun, Observer},
     run::sweep,
 };
+use gyre_configuration::terminal::Failure;
+use gyre_contract::{Pose, PoseHeader, run::Scenario};
 use gyre_storage::create_folder;
-use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::{Setup, TICK, drain};
@@ -54,8 +52,8 @@ impl<'a> Running<'a> {
         let out = tested.run_out(&setup.name);
         let log = tested.run_out(&format!("{}.txt", setup.name));
         create_folder(&tested.out.join("runs"))?;
-        let output = File::create(&log).map_err(StageError::file(&log))?;
-        let errors = output.try_clone().map_err(StageError::file(&log))?;
+        let output = File::create(&log).map_err(RunError::file(&log))?;
+        let errors = output.try_clone().map_err(RunError::file(&log))?;
         // Removes the leftovers of an earlier killed run.
         sweep();
         let work = Work::Run(words(tested, setup, &out));

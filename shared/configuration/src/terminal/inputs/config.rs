@@ -2,9 +2,12 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use crate::paths;
-use crate::terminal::{Failure, WIDTH, print, wrap};
 use clap::Args;
+
+use crate::{
+    paths,
+    terminal::{Failure, WIDTH, print, wrap},
+};
 
 const NAMES: usize = 18;
 

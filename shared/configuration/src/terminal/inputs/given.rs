@@ -2,10 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{Configuration, paths::suggestion};
 use clap::Args;
 
-use crate::terminal::{Failure, inputs::kind::Kind, print};
+use crate::{
+    Configuration,
+    paths::suggestion,
+    terminal::{Failure, inputs::kind::Kind, print},
+};
 
 /// The words that name the inputs of a command.
 #[derive(Clone, Debug, Default, Args)]

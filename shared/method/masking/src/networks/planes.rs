@@ -13,8 +13,10 @@ use ort::{session::Session, value::TensorRef};
 use rten::{Model, ModelOptions, RunOptions, ThreadPool, ValueView};
 use thiserror::Error;
 
-use crate::networks::one_line;
-use crate::networks::runtime::{self, RuntimeError};
+use crate::networks::{
+    one_line,
+    runtime::{self, RuntimeError},
+};
 
 #[derive(Debug, Error)]
 pub enum PlanesError {

@@ -1,15 +1,19 @@
-use crate::{JointMatch, Refined, Refiner};
-use gyre_geometry::samples::{DopplerVelocity, Gyro, Sample, Wheels, with_yaw_rate};
-use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
+use gyre_geometry::{
+    ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion,
+    samples::{DopplerVelocity, Gyro, Sample, Wheels, with_yaw_rate},
+};
 use gyre_masking::Masker;
 use gyre_radar::{
     DopplerEstimator, LostAzimuthFinder, LostAzimuths, NoDoppler, PlacedRows, PolarScan,
 };
 use ndarray::{ArrayView2, ArrayViewMut2};
 
-use crate::odometry::{
-    OdometryConfig, OdometryError, Outcome, Pair, Parts, Registered, Search, SetupError,
-    compensation::LaggedTwists,
+use crate::{
+    JointMatch, Refined, Refiner,
+    odometry::{
+        OdometryConfig, OdometryError, Outcome, Pair, Parts, Registered, Search, SetupError,
+        compensation::LaggedTwists,
+    },
 };
 
 /// Radar odometry. Registers scan after scan against the previous ones.

@@ -1,11 +1,12 @@
-use crate::Aiding;
-use gyre_geometry::samples::{DopplerVelocity, GyroTurn, WheelDistance};
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::{
+    SparsePoint, Twist,
+    samples::{DopplerVelocity, GyroTurn, WheelDistance},
+};
 use gyre_masking::{Masker, Sweep};
 use gyre_radar::{PolarScan, continues};
 use ndarray::{Array2, ArrayView2};
 
-use crate::odometry::OdometryError;
+use crate::{Aiding, odometry::OdometryError};
 
 /// Two consecutive scans: their masked rasters (n x n, row 0 far ahead) and their points.
 pub struct Pair {

@@ -1,7 +1,9 @@
-use crate::{ExhaustiveSearch, RefinementKind, Refiner};
 use gyre_masking::Masker;
 
-use crate::odometry::{DecoupledSearch, OdometryConfig, Search, SearchKind, SetupError};
+use crate::{
+    ExhaustiveSearch, RefinementKind, Refiner,
+    odometry::{DecoupledSearch, OdometryConfig, Search, SearchKind, SetupError},
+};
 
 /// The parts that an [`Odometry`](crate::odometry::Odometry) is composed of. Each part comes from the
 /// configuration. [`Masker::with_function`] has a mask of your own, and `examples/own_search.rs`

@@ -1,9 +1,8 @@
 use crate::{
     ExhaustiveSearch, JointMatch, RotationConfig, SequentialRotation, SettingError,
     TranslationConfig, TranslationSearch,
+    odometry::{OdometryError, Pair},
 };
-
-use crate::odometry::{OdometryError, Pair};
 
 pub trait Search: Send + Sync {
     /// Finds the pose of the later scan's frame in the earlier one's; `None` where the chain of

@@ -1,7 +1,9 @@
 //! Gyro, wheels and Doppler as aiding sensors of a motion, compared with the radar's matches.
 
-use gyre_geometry::UncertainMotion;
-use gyre_geometry::samples::{DopplerConfig, DopplerDisplacement, WheelDistance, WheelsConfig};
+use gyre_geometry::{
+    UncertainMotion,
+    samples::{DopplerConfig, DopplerDisplacement, WheelDistance, WheelsConfig},
+};
 
 use super::{
     Heading, Refiner, WheelState,

@@ -7,8 +7,11 @@
 //! registration, the *yaw bias*, drags the map along as a gyro bias would. The covariance includes
 //! both.
 
-use gyre_geometry::samples::{GyroConfig, GyroTurn};
-use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle, xy_yaw};
+use gyre_geometry::{
+    Pose, UncertainMotion, pose,
+    samples::{GyroConfig, GyroTurn},
+    wrap_angle, xy_yaw,
+};
 use nalgebra::{Matrix4, RowVector4, Vector4};
 
 /// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which

@@ -3,10 +3,13 @@
 //! has a filter of its own, since it is a distance with a scale too: the scale of the Doppler
 //! coefficient.
 
-use super::heading::{GATE, grown};
-use gyre_geometry::samples::{WheelDistance, WheelsConfig};
-use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
+use gyre_geometry::{
+    Pose, Twist, UncertainMotion, pose,
+    samples::{WheelDistance, WheelsConfig},
+};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
+
+use super::heading::{GATE, grown};
 
 /// Random walk of the scale, /√s: tyres that warm change it by 0.06 % in an hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;

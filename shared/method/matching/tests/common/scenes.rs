@@ -1,8 +1,10 @@
 //! Generated point scans with exact truth: reflectors in the plane, seen by a moving sensor that
 //! scans clockwise.
 
-use gyre_geometry::samples::{GyroTurn, WheelDistance};
-use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
+use gyre_geometry::{
+    ComposedMotion, Pose, SparsePoint,
+    samples::{GyroTurn, WheelDistance},
+};
 use gyre_matching::{Aiding, Refined, RefinementConfig, Refiner};
 use nalgebra::{Point2, Vector2, Vector3};
 

@@ -5,10 +5,15 @@
 use std::collections::BTreeMap;
 
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
-use gyre_geometry::samples::{Gyro, GyroKind, Sample, SampleKind, Wheels, WheelsKind};
-use gyre_geometry::{Pose, SparsePoint, xy_yaw};
-use gyre_matching::Refiner;
-use gyre_matching::odometry::{Odometry, OdometryConfig};
+use gyre_geometry::{
+    Pose, SparsePoint,
+    samples::{Gyro, GyroKind, Sample, SampleKind, Wheels, WheelsKind},
+    xy_yaw,
+};
+use gyre_matching::{
+    Refiner,
+    odometry::{Odometry, OdometryConfig},
+};
 use gyre_radar::OwnedScan;
 use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
 

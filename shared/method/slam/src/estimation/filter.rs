@@ -3,9 +3,11 @@ use std::collections::BTreeSet;
 use gyre_geometry::{Pose, Twist, UncertainMotion, covariance::lever};
 use nalgebra::{DMatrix, Matrix3, MatrixXx3, Vector3};
 
-use crate::estimation::constraint::{chi_square, keyframe_exists};
-use crate::estimation::relative::Relative;
-use crate::estimation::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
+use crate::estimation::{
+    CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict,
+    constraint::{chi_square, keyframe_exists},
+    relative::Relative,
+};
 
 /// Linearisations of a loop. After a long drift the second one moves poses by centimetres, the
 /// third by less than a millimetre.

@@ -5,8 +5,11 @@
 
 use std::fmt::Write;
 
-use gyre_geometry::covariance::{pack, unpack};
-use gyre_geometry::{Pose, UncertainMotion, pose, xy_yaw};
+use gyre_geometry::{
+    Pose, UncertainMotion,
+    covariance::{pack, unpack},
+    pose, xy_yaw,
+};
 use nalgebra::Matrix3;
 use thiserror::Error;
 

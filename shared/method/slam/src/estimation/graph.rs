@@ -10,14 +10,14 @@ mod system;
 
 use std::collections::BTreeMap;
 
-use gyre_geometry::{Pose, UncertainMotion};
-
-use crate::estimation::constraint::chi_square;
-use crate::estimation::kernel::Kernel;
-use crate::estimation::relative::Relative;
-use crate::estimation::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
 use edge::Edge;
+use gyre_geometry::{Pose, UncertainMotion};
 use positions::Measured;
+
+use crate::estimation::{
+    CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict, constraint::chi_square,
+    kernel::Kernel, relative::Relative,
+};
 pub use positions::{Position, WeightedPosition, align};
 use solve::Weights;
 use system::System;

@@ -1,11 +1,13 @@
 use std::f64::consts::PI;
 
-use crate::estimation::places::{Candidate, Describer, Descriptor, Registrar};
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_matching::{RefinementConfig, SettingError, Submap};
 use nalgebra::{Matrix3, Point2};
 
-use crate::localisation::{Map, sight::Sight};
+use crate::{
+    estimation::places::{Candidate, Describer, Descriptor, Registrar},
+    localisation::{Map, sight::Sight},
+};
 
 /// Two poses are the same within this angle, rad.
 const SAME_RAD: f64 = 5.0 * PI / 180.0;

@@ -1,15 +1,18 @@
 use std::path::Path;
 
-use crate::estimation::places::{
-    Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceFileError, PlaceIndex,
-    SUBMAP_REACH_M, neighbours,
-};
-use crate::{Keyframe, Record, RecordLog, RecordReader};
 use gyre_geometry::Pose;
 use gyre_matching::Submap;
 use gyre_storage::LogError;
 use nalgebra::Point2;
 use thiserror::Error;
+
+use crate::{
+    Keyframe, Record, RecordLog, RecordReader,
+    estimation::places::{
+        Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceFileError, PlaceIndex,
+        SUBMAP_REACH_M, neighbours,
+    },
+};
 
 const KEYFRAMES: &str = Keyframe::FILE;
 const PLACES: &str = "places.index";

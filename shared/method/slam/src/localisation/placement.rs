@@ -5,14 +5,16 @@
 
 use std::collections::HashSet;
 
-use crate::Keyframe;
-use crate::estimation::{
-    CHI_SQUARE_99_9, Constraint, EstimationError, G2o, GraphOptions, Kind, PoseGraph,
-};
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::localisation::{Fix, Localiser};
+use crate::{
+    Keyframe,
+    estimation::{
+        CHI_SQUARE_99_9, Constraint, EstimationError, G2o, GraphOptions, Kind, PoseGraph,
+    },
+    localisation::{Fix, Localiser},
+};
 
 /// Fixes along so many metres of the path count as one, and so do loops between two such stretches:
 /// their errors are dependent.

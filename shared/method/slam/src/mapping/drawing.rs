@@ -1,10 +1,12 @@
 use std::path::Path;
 
-use crate::Keyframe;
 use gyre_geometry::Pose;
 use nalgebra::Point2;
 
-use crate::mapping::{Evidence, MapError, MapOptions, Overlay, map_png};
+use crate::{
+    Keyframe,
+    mapping::{Evidence, MapError, MapOptions, Overlay, map_png},
+};
 
 /// Odometry's trajectory is drawn if it is somewhere this many cells away from the corrected one:
 /// nearer lines coincide.

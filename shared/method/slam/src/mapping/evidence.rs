@@ -1,15 +1,17 @@
 use std::{collections::BTreeMap, path::Path};
 
-use crate::Keyframe;
 use gyre_geometry::Pose;
 use gyre_storage::StorageError;
 use nalgebra::Point2;
 
-use crate::mapping::{
-    MapError, MapOptions, OptionError, TileSource,
-    store::{BLOCK, BLOCKS, ONE, TileStore},
-    tile::{Cell, TILE_CELLS, TileImage, TileIndex},
-    view::View,
+use crate::{
+    Keyframe,
+    mapping::{
+        MapError, MapOptions, OptionError, TileSource,
+        store::{BLOCK, BLOCKS, ONE, TileStore},
+        tile::{Cell, TILE_CELLS, TileImage, TileIndex},
+        view::View,
+    },
 };
 
 /// Tiles in memory: 70 MB. A keyframe touches 16 to 25 of them.

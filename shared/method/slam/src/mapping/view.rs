@@ -2,11 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use crate::Keyframe;
 use gyre_matching::Submap;
 use nalgebra::{Point2, Vector2};
 
-use crate::mapping::MapOptions;
+use crate::{Keyframe, mapping::MapOptions};
 
 const SECTORS: usize = 360;
 /// Sectors to either side that a return speaks for: a return hides weaker ones at its range within

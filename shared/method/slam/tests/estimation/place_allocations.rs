@@ -1,8 +1,10 @@
 //! After construction, describing, querying and verifying places allocate nothing.
 #![allow(unsafe_code)]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    cell::Cell,
+};
 
 use gyre_geometry::pose;
 use gyre_matching::RefinementConfig;

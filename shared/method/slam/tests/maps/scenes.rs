@@ -1,9 +1,9 @@
 //! Keyframes with simulated points of a scene.
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
-use gyre_slam::Keyframe;
-use gyre_slam::mapping::{
-    Cell, Evidence, MapOptions, TILE_CELLS, TileImage, TileIndex, TileSource,
+use gyre_slam::{
+    Keyframe,
+    mapping::{Cell, Evidence, MapOptions, TILE_CELLS, TileImage, TileIndex, TileSource},
 };
 use nalgebra::Point2;
 

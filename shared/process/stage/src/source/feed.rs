@@ -2,15 +2,15 @@
 
 use std::{mem, os::fd::BorrowedFd, time::Duration};
 
-use gyre_contract::{Hop, Item, Pose, Scan, StageId, flag};
-
-use crate::{
-    Launch, Listener, StageCounters, StageError, clock,
+use gyre_contract::{Hop, Item, Pose, Scan, StageId, flag, run::StageCounters};
+use gyre_transport::{
+    Listener, RunError, clock,
     reader::{Port, Received},
-    schedule::ScheduleWriter,
     wake,
     writer::Writer,
 };
+
+use crate::{Launch, schedule::ScheduleWriter};
 
 /// Time without need for the supervisor to intervene: a source that waits for a sensor or for
 /// another machine repeatedly reports that it is not late, since no restart would help.
@@ -32,7 +32,7 @@ pub(crate) struct Feed<'a, M> {
 }
 
 impl<'a> Feed<'a, Scan> {
-    pub fn of_scans(launch: &'a Launch) -> Result<Self, StageError> {
+    pub fn of_scans(launch: &'a Launch) -> Result<Self, RunError> {
         Self::open(launch, || {
             Ok(vec![Writer::open(&launch.node, &launch.manifest)?])
         })
@@ -47,8 +47,8 @@ impl<'a, M> Feed<'a, M> {
     /// Reads the poses, and opens the topics afterwards.
     pub fn open(
         launch: &'a Launch,
-        outputs: impl FnOnce() -> Result<Vec<Writer<M>>, StageError>,
-    ) -> Result<Self, StageError> {
+        outputs: impl FnOnce() -> Result<Vec<Writer<M>>, RunError>,
+    ) -> Result<Self, RunError> {
         Ok(Self {
             launch,
             credit: Credit::open(launch)?,
@@ -68,7 +68,7 @@ impl<'a, M> Feed<'a, M> {
     }
 
     /// Waits until the sink has reported the newest pose.
-    pub fn wait_for_start(&mut self) -> Result<Item, StageError> {
+    pub fn wait_for_start(&mut self) -> Result<Item, RunError> {
         loop {
             // Sleep first. The sink republishes its last poses one by one and notifies after all of
             // them. Reading earlier could take an older pose for the newest, and more scans would
@@ -87,7 +87,7 @@ impl<'a, M> Feed<'a, M> {
         seq: u64,
         due_ns: Option<i64>,
         admits_all: bool,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         self.schedule.due_at(due_ns.unwrap_or_else(clock::now_ns))?;
         let window = self.launch.manifest.window;
         let mut has_slept = false;
@@ -107,7 +107,7 @@ impl<'a, M> Feed<'a, M> {
         }
     }
 
-    pub fn sleep(&mut self, limit: Duration) -> Result<(), StageError> {
+    pub fn sleep(&mut self, limit: Duration) -> Result<(), RunError> {
         self.sleep_until(None, None, limit)
     }
 
@@ -119,7 +119,7 @@ impl<'a, M> Feed<'a, M> {
         listener: Option<&Listener>,
         connections: impl IntoIterator<Item = BorrowedFd<'fd>>,
         limit: Duration,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         let now_ns = clock::now_ns();
         if self.said_ns.is_some_and(|ns| now_ns >= ns + SAID_EVERY_NS) {
             self.schedule.due_at(now_ns + ALIVE_NS)?;
@@ -138,20 +138,20 @@ impl<'a, M> Feed<'a, M> {
         self.counters.wakes += 1;
         self.may_have_new_readers = woken.may_have_new_readers;
         match woken.stop {
-            true => Err(StageError::Stopped),
+            true => Err(RunError::Stopped),
             false => Ok(()),
         }
     }
 
-    pub fn end(&mut self, item: Item) -> Result<(), StageError> {
+    pub fn end(&mut self, item: Item) -> Result<(), RunError> {
         let mut outputs = self.outputs.iter();
         outputs.try_for_each(|output| output.end(item, Some(StageId::RadarReplay)))?;
         self.schedule.has_published(item.published)
     }
 
-    pub fn finish(self, ended: Result<(), StageError>) -> Result<StageCounters, StageError> {
+    pub fn finish(self, ended: Result<(), RunError>) -> Result<StageCounters, RunError> {
         match ended {
-            Ok(()) | Err(StageError::Stopped) => Ok(self.counters),
+            Ok(()) | Err(RunError::Stopped) => Ok(self.counters),
             Err(error) => Err(error),
         }
     }
@@ -179,9 +179,9 @@ pub struct Credit {
 }
 
 impl Credit {
-    pub fn open(launch: &Launch) -> Result<Self, StageError> {
+    pub fn open(launch: &Launch) -> Result<Self, RunError> {
         Ok(Self {
-            poses: Port::open(launch)?,
+            poses: launch.port()?,
             newest: None,
             published: None,
             resume_at: None,
@@ -189,13 +189,13 @@ impl Credit {
         })
     }
 
-    pub fn update(&mut self) -> Result<(), StageError> {
+    pub fn update(&mut self) -> Result<(), RunError> {
         while self.take()?.is_some() {}
         Ok(())
     }
 
     /// Takes the next pose into account and returns it; `None` if no pose has come.
-    pub fn take(&mut self) -> Result<Option<Received<Pose>>, StageError> {
+    pub fn take(&mut self) -> Result<Option<Received<Pose>>, RunError> {
         let Some(pose) = self.poses.receive()? else {
             return Ok(None);
         };

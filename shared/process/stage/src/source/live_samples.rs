@@ -17,9 +17,10 @@ use gyre_geometry::samples::{
 
 use super::Sensor;
 use crate::{
-    Launch, StageError,
+    Launch,
     datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive},
 };
+use gyre_transport::RunError;
 
 /// The live sensors beside a radar.
 pub(super) struct LiveSensors {
@@ -47,7 +48,7 @@ struct Live {
 
 impl LiveSensors {
     /// Opens the samples of the sections `[gyro]` and `[wheels]`; `None` without one.
-    pub fn open(launch: &Launch) -> Result<Option<Self>, StageError> {
+    pub fn open(launch: &Launch) -> Result<Option<Self>, RunError> {
         let (gyro, wheels): (GyroConfig, WheelsConfig) =
             (launch.section("gyro")?, launch.section("wheels")?);
         let (mut sensors, mut max_wait_ms) = (Vec::new(), 0_f64);
@@ -79,7 +80,7 @@ impl LiveSensors {
     }
 
     /// Takes the samples that have arrived, at most one turn of them.
-    pub fn receive(&mut self, radar: &mut impl Sensor) -> Result<(), StageError> {
+    pub fn receive(&mut self, radar: &mut impl Sensor) -> Result<(), RunError> {
         for live in &mut self.sensors {
             let arrived = (0..MAX_SAMPLES).map_while(|_| radar.sample(live.kind));
             arrived.for_each(|sample| live.samples.add(&sample));
@@ -122,7 +123,7 @@ impl Live {
         listens: Option<String>,
         sensor: LiveSensor,
         parse: fn(&str) -> Option<Sample>,
-    ) -> Result<Self, StageError> {
+    ) -> Result<Self, RunError> {
         let section = kind.section();
         let socket = listens.map(|at| listen(section, section, &at));
         Ok(Self {
@@ -140,7 +141,7 @@ impl Live {
         so_far.wrapping_sub(mem::replace(&mut self.dropped, so_far)) as usize
     }
 
-    fn receive(&mut self, datagram: &mut [u8]) -> Result<(), StageError> {
+    fn receive(&mut self, datagram: &mut [u8]) -> Result<(), RunError> {
         let Some(socket) = &self.socket else {
             return Ok(());
         };

@@ -1,6 +1,6 @@
 //! The pace of playback.
 
-use crate::clock;
+use gyre_transport::clock;
 
 /// Maps sensor time to run time: `due = start + (complete - first) / rate`.
 #[derive(Clone, Copy)]

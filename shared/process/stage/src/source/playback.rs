@@ -1,11 +1,11 @@
 //! Playing: which scan is next, when it is due, and when the window admits it.
 
-use gyre_contract::Scan;
-use gyre_contract::run::SourceConfig;
+use gyre_contract::{Scan, run::SourceConfig};
 use gyre_radar::continues;
+use gyre_transport::{RunError, clock, wake, writer::Draft};
 
 use super::{Attempts, Feed, PAUSE, Source, Unreadable, hop, pace::Pace, position::Position};
-use crate::{StageError, clock, counters::Work, wake, writer::Draft};
+use crate::counters::Work;
 
 pub(super) struct Playback<'a, S: Source> {
     pub feed: Feed<'a, Scan>,
@@ -14,7 +14,7 @@ pub(super) struct Playback<'a, S: Source> {
 }
 
 impl<S: Source> Playback<'_, S> {
-    pub fn play(&mut self) -> Result<(), StageError> {
+    pub fn play(&mut self) -> Result<(), RunError> {
         let newest_pose = self.feed.wait_for_start()?;
         // In live mode the numbers do not determine the distance to the previous scan; masking does
         // without it.
@@ -65,7 +65,7 @@ impl<S: Source> Playback<'_, S> {
         gap_ns: Option<i64>,
         complete_ns: i64,
         published: u64,
-    ) -> Result<Option<i64>, StageError> {
+    ) -> Result<Option<i64>, RunError> {
         let Some(rate) = self.feed.launch.manifest.rate else {
             return Ok(None);
         };
@@ -102,10 +102,7 @@ impl<S: Source> Playback<'_, S> {
     }
 
     /// Reads the next scan into shared memory before it is due; `None` at the end.
-    fn next_readable(
-        &mut self,
-        position: &mut Position,
-    ) -> Result<Option<Draft<Scan>>, StageError> {
+    fn next_readable(&mut self, position: &mut Position) -> Result<Option<Draft<Scan>>, RunError> {
         let mut draft = self.feed.scans().loan()?;
         let mut skipped = 0;
         while position.index < self.source.scans().end {
@@ -118,7 +115,7 @@ impl<S: Source> Playback<'_, S> {
             skipped += 1;
             let most = self.config.max_unreadable;
             if skipped > most {
-                return Err(StageError::Input(format!(
+                return Err(RunError::Input(format!(
                     "{skipped} scans in a row cannot be read, the last because {reason}; source.max_unreadable is {most}"
                 )));
             }
@@ -131,7 +128,7 @@ impl<S: Source> Playback<'_, S> {
         &mut self,
         position: &Position,
         draft: &mut Draft<Scan>,
-    ) -> Result<Option<String>, StageError> {
+    ) -> Result<Option<String>, RunError> {
         let mut attempts = Attempts::new(self.config);
         loop {
             let work = Work::begin();
@@ -183,7 +180,7 @@ impl<S: Source> Playback<'_, S> {
 
     /// Leaves the processors to the scan in flight, since a real sensor would not use them to read
     /// a recording. Returns at that scan's pose, or half-way to the next scan.
-    fn yield_processors(&mut self, position: &Position, pace: Pace) -> Result<(), StageError> {
+    fn yield_processors(&mut self, position: &Position, pace: Pace) -> Result<(), RunError> {
         let Some(due_ns) = self.expected_ns(position.index, position.published, pace) else {
             return Ok(());
         };

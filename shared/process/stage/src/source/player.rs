@@ -4,15 +4,14 @@
 
 use std::ops::Range;
 
-use gyre_contract::{Item, Scan, StageId, flag};
-
-use super::{Feed, Pace, hop};
-use crate::{
-    Launch, StageCounters, StageError, clock, counters,
-    message::{AnyMessage, RecordedMessage},
-    wake,
+use gyre_contract::{Item, Scan, StageId, flag, run::StageCounters};
+use gyre_transport::{
+    AnyMessage, RecordedMessage, RunError, clock, wake,
     writer::{TopicWriter, Writer, item_of},
 };
+
+use super::{Feed, Pace, hop};
+use crate::{Launch, counters};
 
 /// Plays recorded messages until SIGTERM: of each of these topics, in the order of the stream, the
 /// messages with these sequence numbers. `read` returns one of them.
@@ -20,10 +19,12 @@ pub fn run_player(
     launch: &Launch,
     topics: &[&str],
     items: Range<u64>,
-    mut read: impl FnMut(&str, u64) -> Result<RecordedMessage, StageError>,
-) -> Result<StageCounters, StageError> {
+    mut read: impl FnMut(&str, u64) -> Result<RecordedMessage, RunError>,
+) -> Result<StageCounters, RunError> {
     launch.take_place()?;
-    let mut feed = Feed::open(launch, || TopicWriter::of_stream(launch, topics))?;
+    let mut feed = Feed::open(launch, || {
+        TopicWriter::of_stream(&launch.node, &launch.manifest, topics)
+    })?;
     // The supervisor takes its publisher for a sign that the source has started.
     let _scans = Writer::<Scan>::open(&launch.node, &launch.manifest)?;
     let ended = play(&mut feed, items, &mut read);
@@ -33,8 +34,8 @@ pub fn run_player(
 fn play(
     feed: &mut Feed<'_, AnyMessage>,
     items: Range<u64>,
-    read: &mut impl FnMut(&str, u64) -> Result<RecordedMessage, StageError>,
-) -> Result<(), StageError> {
+    read: &mut impl FnMut(&str, u64) -> Result<RecordedMessage, RunError>,
+) -> Result<(), RunError> {
     let newest = feed.wait_for_start()?;
     // The others need the message of the newest pose as the previous one.
     let mut seq = match newest.is(flag::BASE) {

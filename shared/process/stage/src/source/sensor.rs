@@ -3,19 +3,14 @@
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
-use gyre_contract::{NumberedBy, Scan, ScanHeader, StageId};
+use gyre_contract::{NumberedBy, Scan, ScanHeader, StageId, control::Received, run::StageCounters};
 use gyre_geometry::samples::{Sample, SampleKind};
+use gyre_transport::{
+    Generation, RunError, clock, numbers::Numbers, received, wake, writer::Draft,
+};
 
-use super::{
-    Feed, hop,
-    live_samples::LiveSensors,
-    position::Position,
-    received::{self, Received},
-};
-use crate::{
-    Generation, Launch, StageCounters, StageError, clock, counters::Work, numbers::Numbers, wake,
-    writer::Draft,
-};
+use super::{Feed, hop, live_samples::LiveSensors, position::Position};
+use crate::{Launch, counters::Work};
 
 /// A sensor that delivers scans at its own pace.
 pub trait Sensor {
@@ -27,7 +22,7 @@ pub trait Sensor {
 
     /// Takes the received data and writes them into shared memory, without waiting. After
     /// [`Arrival::Scan`] it is called again at once, with memory for the next scan.
-    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError>;
+    fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, RunError>;
 
     /// Returns when the scan that was returned last was complete by the sensor's clock,
     /// `CLOCK_MONOTONIC`, ns, however late it was read; `None` if that is not known: then its
@@ -69,7 +64,7 @@ pub fn run_sensor(
     launch: &Launch,
     sensor: &mut impl Sensor,
     scans: Option<u64>,
-) -> Result<StageCounters, StageError> {
+) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     sensor.resume(received::read(&launch.manifest).unwrap_or_default());
     let mut stream = Stream {
@@ -91,7 +86,7 @@ struct Stream<'a> {
 }
 
 impl Stream<'_> {
-    fn publish<S: Sensor>(&mut self, sensor: &mut S, scans: Option<u64>) -> Result<(), StageError> {
+    fn publish<S: Sensor>(&mut self, sensor: &mut S, scans: Option<u64>) -> Result<(), RunError> {
         let newest = self.feed.wait_for_start()?;
         let mut position = Position::after(&newest, self.feed.schedule.before);
         // A restarted run knows the number of scans published up to its newest pose.
@@ -125,11 +120,7 @@ impl Stream<'_> {
     }
 
     /// Waits for the next scan; returns when the reading of its end began, ns.
-    fn take(
-        &mut self,
-        sensor: &mut impl Sensor,
-        draft: &mut Draft<Scan>,
-    ) -> Result<i64, StageError> {
+    fn take(&mut self, sensor: &mut impl Sensor, draft: &mut Draft<Scan>) -> Result<i64, RunError> {
         loop {
             let work = Work::begin();
             let (header, bytes) = draft.parts();
@@ -151,7 +142,7 @@ impl Stream<'_> {
         &mut self,
         sensor: &mut impl Sensor,
         draft: &mut Draft<Scan>,
-    ) -> Result<(), StageError> {
+    ) -> Result<(), RunError> {
         let Some(live) = &mut self.live else {
             return Ok(());
         };

@@ -1,7 +1,7 @@
 //! A message as a value.
 
 use gyre_contract::{Item, Message};
-use gyre_stage::{StageError, writer::TopicWriter};
+use gyre_transport::{RunError, writer::TopicWriter};
 
 use super::Tap;
 
@@ -25,7 +25,7 @@ impl Recorded {
     }
 
     /// Receives the next message; `None` if there is no message yet.
-    pub fn receive(tap: &Tap) -> Result<Option<Self>, StageError> {
+    pub fn receive(tap: &Tap) -> Result<Option<Self>, RunError> {
         Ok(tap.receive()?.map(|received| Self {
             header: received.header_bytes().to_vec(),
             payload: received.values::<u8>().to_vec(),
@@ -34,13 +34,13 @@ impl Recorded {
     }
 
     /// Sends it as it is, with its time stamps, and notifies the readers.
-    pub fn send(&self, feed: &TopicWriter) -> Result<(), StageError> {
+    pub fn send(&self, feed: &TopicWriter) -> Result<(), RunError> {
         feed.send_unchanged(&self.header, &self.payload)
     }
 
-    pub fn header<M: Message>(&self) -> Result<M::Header, StageError> {
+    pub fn header<M: Message>(&self) -> Result<M::Header, RunError> {
         bytemuck::try_pod_read_unaligned(&self.header).map_err(|_| {
-            StageError::Input(format!(
+            RunError::Input(format!(
                 "a header of {} bytes does not belong to topic `{}`",
                 self.header.len(),
                 M::TOPIC

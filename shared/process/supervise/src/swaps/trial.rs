@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::control::Answer;
+use gyre_contract::control::Answer;
 
 use super::Swaps;
 use crate::{child::Child, processes::Processes, run::Run, socket::Client};

@@ -1,8 +1,7 @@
 //! HOTA (Luiten et al., "HOTA: A higher order metric for evaluating multi-object tracking", 2021):
 //! detection and association weigh alike, at all accuracies of the place.
 
-use std::collections::BTreeMap;
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
 
 use gyre_objects::assign;
 use serde::Serialize;

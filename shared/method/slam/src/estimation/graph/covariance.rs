@@ -3,11 +3,8 @@
 use gyre_geometry::UncertainMotion;
 use nalgebra::Matrix3;
 
-use super::PoseGraph;
-use super::system::System;
-use crate::estimation::EstimationError;
-use crate::estimation::constraint::keyframe_exists;
-use crate::estimation::relative::Relative;
+use super::{PoseGraph, system::System};
+use crate::estimation::{EstimationError, constraint::keyframe_exists, relative::Relative};
 
 impl PoseGraph {
     /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses:

@@ -4,12 +4,16 @@
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix2x3, Matrix3, Vector2};
 
-use super::edge::{Ends, Linear};
-use super::solve::{COARSE, Weights};
-use super::{PoseGraph, State};
-use crate::estimation::EstimationError;
-use crate::estimation::constraint::{CHI_SQUARE_99_9_PLANE, keyframe_exists};
-use crate::estimation::kernel::Kernel;
+use super::{
+    PoseGraph, State,
+    edge::{Ends, Linear},
+    solve::{COARSE, Weights},
+};
+use crate::estimation::{
+    EstimationError,
+    constraint::{CHI_SQUARE_99_9_PLANE, keyframe_exists},
+    kernel::Kernel,
+};
 
 /// The heading of the graph's frame must be known to this standard deviation before positions move
 /// any pose, rad: linearised equations hold within it.

@@ -4,12 +4,8 @@
 use gyre_geometry::{Pose, xy_yaw};
 use nalgebra::DVector;
 
-use super::dogleg::Dogleg;
-use super::edge::Edge;
-use super::system::System;
-use super::{Closing, PoseGraph, Solution, State};
-use crate::estimation::EstimationError;
-use crate::estimation::relative::corrected;
+use super::{Closing, PoseGraph, Solution, State, dogleg::Dogleg, edge::Edge, system::System};
+use crate::estimation::{EstimationError, relative::corrected};
 
 /// Above this share of the predicted decrease of the cost the trust radius grows.
 const GOOD_GAIN: f64 = 0.75;

@@ -2,8 +2,10 @@ use std::collections::TryReserveError;
 
 use nalgebra::{DVector, Matrix3};
 
-use super::cholesky::Cholesky;
-use super::edge::{Ends, Linear};
+use super::{
+    cholesky::Cholesky,
+    edge::{Ends, Linear},
+};
 
 /// A symmetric system of equations with three rows a pose and a block for each pair of poses that
 /// share an edge; only the lower triangle is stored. Pose 0 is fixed and has no rows.

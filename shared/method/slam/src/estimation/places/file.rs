@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 use bytemuck::{cast_slice, pod_read_unaligned};
 use gyre_storage::StorageError;
 
-use super::descriptor::SPECTRUM_BYTES;
-use super::{Descriptor, PlaceIndex};
+use super::{Descriptor, PlaceIndex, descriptor::SPECTRUM_BYTES};
 
 const MARK: [u8; 8] = *b"GYREPLCS";
 /// Increases with every change of the layout or of the meaning of descriptors.

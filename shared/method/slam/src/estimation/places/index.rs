@@ -1,5 +1,4 @@
-use std::f64::consts::PI;
-use std::sync::Arc;
+use std::{f64::consts::PI, sync::Arc};
 
 use gyre_geometry::wrap_angle;
 use gyre_matching::{Peak, line_peak};

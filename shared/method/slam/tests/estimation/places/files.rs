@@ -1,7 +1,6 @@
 //! Saved places are refused when they are damaged.
 
-use std::fs;
-use std::path::Path;
+use std::{fs, path::Path};
 
 use gyre_geometry::pose;
 use gyre_slam::estimation::places::{Describer, Descriptor, PlaceIndex};

@@ -1,7 +1,6 @@
 //! A simulated street, driven out and back.
 
-use std::f64::consts::PI;
-use std::{fs, path::Path};
+use std::{f64::consts::PI, fs, path::Path};
 
 use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
 use gyre_matching::{RefinementConfig, Submap};

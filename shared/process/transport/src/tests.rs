@@ -1,0 +1,12 @@
+//! The properties of the transport that this crate relies on, tested with real shared memory.
+
+#![allow(clippy::unwrap_used)]
+
+mod generations;
+mod hand_over;
+mod logs;
+mod typed;
+mod wake_up;
+mod zero_copy;
+
+use crate::rig::{Run, WINDOW, node, reader, send, writer};
