@@ -17,8 +17,9 @@ use gyre_datasets::{
     DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, InspectedLogs, Properties,
     ReadError, inspect_dataset, turn_ns, write_tum,
 };
+use gyre_geometry::{OwnedScan, ScanSlot, Sense, SweepGeometry, scan::flag};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::{OwnedScan, ScanSlot, Sense, SweepGeometry, Trajectory, scan::flag};
+use gyre_radar::Trajectory;
 
 const SIZE: ImageSize = ImageSize {
     width: 576,

@@ -9,8 +9,8 @@
 
 use std::{error::Error, f32::consts::TAU};
 
+use gyre_geometry::{PolarScan, Sense, SweepGeometry, scan::flag};
 use gyre_matching::odometry::{Odometry, OdometryConfig, Registered};
-use gyre_radar::{PolarScan, Sense, SweepGeometry, scan::flag};
 
 const AZIMUTHS: usize = 400;
 const BINS: usize = 720;

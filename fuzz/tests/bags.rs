@@ -9,7 +9,7 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_geometry::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
 use gyre_ros2_messages::{Ros2Message, encode, radar::ScanMessages};
 use mcap::{WriteOptions, Writer, records::MessageHeader};
 

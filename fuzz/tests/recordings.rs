@@ -9,7 +9,7 @@ use gyre_fuzz::{
     edit::{ByteEdit, Number, TextEdit, edit_bytes, edit_text},
     recording::{Image, Recording, write},
 };
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 
 /// An edit of a row's metadata, or of its pixels.
 #[derive(Clone, Debug, TypeGenerator)]

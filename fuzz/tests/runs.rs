@@ -10,7 +10,7 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingWriter};
 
 use crate::recordings::folder;

@@ -11,7 +11,7 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
 };
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 
 const AZIMUTHS: u16 = 16;
 const BINS: u16 = 40;

@@ -1,9 +1,9 @@
 //! Masks.
 
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::{PolarScan, SparsePoint, Twist, continues};
 use gyre_masking::Sweep;
 use gyre_matching::odometry::OdometryError;
-use gyre_radar::{LostAzimuthFinder, PlacedRows, PolarScan, continues};
+use gyre_radar::{LostAzimuthFinder, PlacedRows};
 use ndarray::ArrayViewMut2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};
 use pyo3::{exceptions::PyTypeError, prelude::*, types::PySlice};

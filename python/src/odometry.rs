@@ -24,7 +24,7 @@ struct State {
 impl State {
     fn register(
         &mut self,
-        scan: &gyre_radar::PolarScan<'_>,
+        scan: &gyre_geometry::PolarScan<'_>,
         samples: &[Sample],
     ) -> Result<Registered, OdometryError> {
         let mut registered = self.odometry.register(scan, samples)?;

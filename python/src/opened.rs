@@ -1,8 +1,7 @@
 //! A recording, and what other sensors measured meanwhile.
 
 use gyre_datasets::{Dataset, ReadError, ScanSamples};
-use gyre_geometry::samples::Sample;
-use gyre_radar::{ScanSlot, SweepGeometry};
+use gyre_geometry::{ScanSlot, SweepGeometry, samples::Sample};
 
 pub struct Opened {
     pub scans: Box<dyn Dataset>,

@@ -1,8 +1,11 @@
 //! Scans in the memory of numpy arrays.
 
 use gyre_datasets::ReadError;
-use gyre_geometry::samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample, SampleKind};
-use gyre_radar::{PolarScan, ScanSlot, Sense, SweepGeometry, scan::flag};
+use gyre_geometry::{
+    PolarScan, ScanSlot, Sense, SweepGeometry,
+    samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample, SampleKind},
+    scan::flag,
+};
 use ndarray::{Ix1, Ix2, IxDyn};
 use numpy::{
     PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,

@@ -4,7 +4,8 @@
 use std::{f64::consts::TAU, fs, path::Path};
 
 use gyre_datasets::{Dataset, DatasetOptions, LostAzimuthOption, open, stored_options};
-use gyre_radar::{OwnedScan, lost::stale_rows, scan::flag};
+use gyre_geometry::{OwnedScan, scan::flag};
+use gyre_radar::lost::stale_rows;
 use serde_json::json;
 
 use crate::common::{Ended, Run, gyre, recording};

@@ -4,9 +4,9 @@ use std::{collections::BTreeSet, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_contract::{PoseHeader, flag};
+use gyre_geometry::OwnedScan;
 use gyre_journal as journal;
 use gyre_matching::odometry::{Odometry, OdometryConfig, Outcome, Registered};
-use gyre_radar::OwnedScan;
 
 use crate::{
     common::{Run, real_data, runtime_is_installed},

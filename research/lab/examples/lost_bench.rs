@@ -3,12 +3,11 @@
 //!
 //! `cargo run --release --manifest-path research/Cargo.toml -p gyre-lab --example lost_bench`
 
+use std::{error::Error, path::Path, time::Instant};
+
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::Twist;
-use gyre_radar::{LostAzimuthFinder, LostAzimuths, OwnedScan, lost::stale_rows};
-use std::error::Error;
-use std::path::Path;
-use std::time::Instant;
+use gyre_geometry::{Twist, LostAzimuths, OwnedScan};
+use gyre_radar::{LostAzimuthFinder, lost::stale_rows};
 
 /// Recordings, and a typical speed, m/s.
 const RECORDINGS: [(&str, f64); 3] = [

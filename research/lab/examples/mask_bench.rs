@@ -7,9 +7,9 @@
 use std::{error::Error, hint::black_box, path::Path, time::Instant};
 
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::{SparsePoint, Twist, OwnedScan};
 use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep, network::Network};
-use gyre_radar::{OwnedScan, PointsConfig, RasterConfig};
+use gyre_radar::{PointsConfig, RasterConfig};
 use ndarray::{Array2, Axis};
 
 const SCANS: usize = 100;

@@ -13,11 +13,10 @@
 use std::{collections::BTreeMap, error::Error, f64::consts::TAU, path::Path, env, fs};
 
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
-use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
+use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw, OwnedScan};
 use gyre_masking::networks::runtime;
 use gyre_matching::odometry::{Odometry, OdometryConfig};
 use gyre_objects::{Object, ObjectTracker, PlacedScan};
-use gyre_radar::OwnedScan;
 use gyre_results::evaluation::{ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_worlds::{drive::DriveKind, weather::WeatherConfig, Realism, SimulatedDrive, SimulationConfig};
 use nalgebra::{Point2, Vector2};

@@ -3,12 +3,11 @@
 //!
 //! `cargo run --release --manifest-path research/Cargo.toml -p gyre-lab --example points_bench`
 
+use std::{error::Error, path::Path, time::Instant};
+
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::SparsePoint;
-use gyre_radar::{OwnedScan, PointExtractor, PointsConfig};
-use std::error::Error;
-use std::path::Path;
-use std::time::Instant;
+use gyre_geometry::{SparsePoint, OwnedScan};
+use gyre_radar::{PointExtractor, PointsConfig};
 
 const RECORDINGS: [&str; 2] = ["radiate-2019-02-12", "oxford-2019-01-10-14-36-48"];
 const SCANS: usize = 50;

@@ -4,13 +4,12 @@
 //!
 //! `cargo run --release --manifest-path research/Cargo.toml -p gyre-lab --example raster_bench`
 
+use std::{error::Error, path::Path, time::{Duration, Instant}};
+
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::Twist;
-use gyre_radar::{OwnedScan, RasterConfig, Rasteriser, Sampling, ScanLimits, Sense, SweepGeometry};
+use gyre_geometry::{Twist, OwnedScan, ScanLimits, Sense, SweepGeometry};
+use gyre_radar::{RasterConfig, Rasteriser, Sampling};
 use ndarray::Array2;
-use std::error::Error;
-use std::path::Path;
-use std::time::{Duration, Instant};
 
 const AZIMUTHS: usize = 400;
 const BINS: usize = 3768;

@@ -19,7 +19,7 @@ use std::{
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
 use gyre_datasets::{Dataset, DatasetOptions};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use gyre_configuration::terminal::{Failure, print};
 use gyre_tools::masks::picture::write_grey;
 use rand::{RngCore, SeedableRng};

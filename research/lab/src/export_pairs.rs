@@ -28,8 +28,7 @@ mod provenance;
 use std::{fs, path::PathBuf, process::ExitCode, time::Instant};
 
 use gyre_configuration::{Configuration, terminal::{Failure, print}};
-use gyre_geometry::Pose;
-use gyre_radar::OwnedScan;
+use gyre_geometry::{Pose, OwnedScan};
 use npy::NpyWriter;
 use preparation::Preparation;
 use provenance::Sequence;

@@ -4,8 +4,8 @@ use std::{ops::Range, path::{Path, PathBuf}};
 
 use gyre_configuration::{Configuration, Played, terminal::{Failure, print}};
 use gyre_datasets::{Dataset, ground_truth::{find_ground_truth, parse_trajectory, read_trajectory}};
-use gyre_geometry::Pose;
-use gyre_radar::{OwnedScan, Trajectory};
+use gyre_geometry::{Pose, OwnedScan};
+use gyre_radar::Trajectory;
 use gyre_results::SIMULATED_TRUTH;
 
 /// A trajectory is not interpolated across wider gaps, as in `gyre evaluate`, but for those that

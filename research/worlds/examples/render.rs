@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use gyre_worlds::{SimulationConfig, Simulator};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

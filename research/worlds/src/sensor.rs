@@ -45,33 +45,19 @@ mod vibration;
 
 use std::f64::consts::TAU;
 
-use gyre_radar::scan::flag;
-use gyre_radar::{ScanSlot, Sense, SweepGeometry};
+use gyre_geometry::{scan::flag, ScanSlot, Sense, SweepGeometry};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use self::antenna::Antenna;
-use self::atmosphere::Atmosphere;
-use self::beam_index::BeamIndex;
+use self::{antenna::Antenna, atmosphere::Atmosphere, beam_index::BeamIndex};
 pub use self::config::SensorConfig;
 use self::echoes::{Echo, View};
 pub use self::effects::Effects;
 use self::effects::is_on;
 pub(crate) use self::elevation::PitchRoll;
-use self::faults::Faults;
-use self::fixed_echoes::FixedEchoes;
-use self::line_of_sight::LineOfSight;
-use self::noise::Noise;
-use self::spectrum::RangeSpectrum;
-use self::sweep_poses::SweepPoses;
-use crate::body::{Movers, Moving};
-use crate::path::Path;
-use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
-use crate::relief::Relief;
-use crate::stream::Stream;
-use crate::weather::WeatherConfig;
-use crate::world::World;
+use crate::{body::{Movers, Moving}, path::Path, profile::{Chirp, METADATA_BYTES, Receiver, Sampling}, relief::Relief, stream::Stream, weather::WeatherConfig, world::World};
+use self::{faults::Faults, fixed_echoes::FixedEchoes, line_of_sight::LineOfSight, noise::Noise, spectrum::RangeSpectrum, sweep_poses::SweepPoses};
 pub use gyre_simulator::SweepTime;
 
 /// Size of each azimuth's part of a scan's random numbers, in words.

@@ -4,8 +4,7 @@
 use std::path::PathBuf;
 
 use gyre_datasets::{DatasetOptions, Format, ImageSize, ImageSource};
-use gyre_geometry::samples::Sample;
-use gyre_radar::{OwnedScan, ScanSlot};
+use gyre_geometry::{samples::Sample, OwnedScan, ScanSlot};
 
 use crate::{config::SimulationConfig, error::SimulatorError, gyro::log, layout::{side_file::SideFile, boreas, oxford, radiate}, objects, output::{HostStamps, OutputFormat}, profile::{Chirp, METADATA_BYTES}, sensor::{Sensor, effects::is_on}, simulator::Simulator, truth, gnss, wheels};
 

@@ -2,8 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use gyre_geometry::{Pose, samples::{RawFix, Sample}};
-use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_geometry::{Pose, samples::{RawFix, Sample}, OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
 use nalgebra::Point2;
 
 use crate::{config::{MAX_SCANS, SimulationConfig}, error::SimulatorError, gyro::{Vehicle, log}, path::{Path, recorded::{self, Excerpt}}, profile::Sampling, relief::Relief, sensor::{effects::is_on, PitchRoll, Scene, Sensor, SweepTime}, streets::Streets, town::{ParkedCar, Town}, traffic::{Observer, RoadUser, Traffic}, tunnel, weather::WeatherConfig, world::World, gnss, wheels};

@@ -1,16 +1,11 @@
 //! A dataset in Oxford's format: reproducible, and in its conventions.
 
-use std::fs;
-use std::path::Path;
+use std::{fs, path::Path};
+
+use gyre_geometry::{Pose, OwnedScan, scan::flag};
+use gyre_worlds::{profile::METADATA_BYTES, GyroProfile, SimulatedGyroConfig, SimulationConfig, Simulator, SimulatorError, write_dataset};
 
 use crate::common::all_files;
-use gyre_geometry::Pose;
-use gyre_radar::OwnedScan;
-use gyre_radar::scan::flag;
-use gyre_worlds::profile::METADATA_BYTES;
-use gyre_worlds::{
-    GyroProfile, SimulatedGyroConfig, SimulationConfig, Simulator, SimulatorError, write_dataset,
-};
 
 fn config(scans: usize) -> SimulationConfig {
     SimulationConfig {

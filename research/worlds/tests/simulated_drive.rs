@@ -1,20 +1,13 @@
 //! Datasets of each format: written, read by the readers for real data, interrupted, resumed, and
 //! streamed without a disk.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::num::NonZeroUsize;
-use std::path::Path;
+use std::{collections::BTreeMap, fs, num::NonZeroUsize, path::Path};
+
+use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, inspect, read_trajectory};
+use gyre_geometry::{Pose, OwnedScan};
+use gyre_worlds::{output::OutputConfig, HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary, write_dataset, write_dataset_on};
 
 use crate::common::all_files;
-use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, inspect, read_trajectory};
-use gyre_geometry::Pose;
-use gyre_radar::OwnedScan;
-use gyre_worlds::output::OutputConfig;
-use gyre_worlds::{
-    HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
-    write_dataset, write_dataset_on,
-};
 
 const FORMATS: [OutputFormat; 3] = [
     OutputFormat::Oxford,

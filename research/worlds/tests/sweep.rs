@@ -3,11 +3,8 @@
 use std::f64::consts::TAU;
 
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::{Pose, Twist};
-use gyre_radar::OwnedScan;
-use gyre_worlds::body::{NO_BODY, Scatterer, Wall};
-use gyre_worlds::profile::{Profile, Sampling};
-use gyre_worlds::{Body, Effects, Path, SensorConfig, SimulationConfig, Simulator};
+use gyre_geometry::{Pose, Twist, OwnedScan};
+use gyre_worlds::{body::{NO_BODY, Scatterer, Wall}, profile::{Profile, Sampling}, Body, Effects, Path, SensorConfig, SimulationConfig, Simulator};
 use nalgebra::Point2;
 
 use crate::effects::scene::Setup;

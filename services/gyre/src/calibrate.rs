@@ -17,8 +17,10 @@ use gyre_configuration::{
     terminal::{Failure, inputs::Inputs, print},
     with_stored_options,
 };
-use gyre_geometry::samples::{GyroKind, WheelsKind};
-use gyre_radar::{OwnedScan, SweepGeometry};
+use gyre_geometry::{
+    OwnedScan, SweepGeometry,
+    samples::{GyroKind, WheelsKind},
+};
 use gyre_results::{Content, Out};
 use gyre_storage as storage;
 use gyre_tools::bar::Bar;

@@ -9,11 +9,10 @@ mod python;
 mod scans;
 
 use gyre_contract::{Item, Masked, MaskedHeader, StageId, flag, mask_kind, run::StageCounters};
-use gyre_geometry::{Twist, samples::DopplerConfig};
+use gyre_geometry::{LostAzimuths, Twist, samples::DopplerConfig};
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_radar::{
-    DopplerEstimator, LostAzimuthFinder, LostAzimuths, PlacedRows, PointsConfig, RasterConfig,
-    lost::stale_rows,
+    DopplerEstimator, LostAzimuthFinder, PlacedRows, PointsConfig, RasterConfig, lost::stale_rows,
 };
 use gyre_stage::{Launch, Stage, stage};
 use gyre_transport::{RunError, writer::Draft};

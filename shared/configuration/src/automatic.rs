@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use thiserror::Error;
 use toml::{Table, Value};
 

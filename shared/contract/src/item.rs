@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use gyre_radar::{LostAzimuths, MAX_AZIMUTHS, lost::MAX_GAPS};
+use gyre_geometry::{LostAzimuths, MAX_AZIMUTHS, MAX_GAPS};
 
 use crate::{check::require, limits::Window};
 

@@ -3,9 +3,8 @@
 use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::{OdometryMotion, Twist, covariance, pose, xy_yaw};
+use gyre_geometry::{MAX_INTERVAL_NS, OdometryMotion, Twist, covariance, pose, xy_yaw};
 use gyre_matching::{MotionMatch, RotationMatch};
-use gyre_radar::MAX_INTERVAL_NS;
 
 use crate::{
     check::{covariance as check_covariance, fields, finite, planar, require, within},

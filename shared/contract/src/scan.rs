@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample};
-use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
+use gyre_geometry::{
+    MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry,
+    samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample},
+};
 
 use crate::{
     check::require,
@@ -83,7 +85,7 @@ pub struct ScanHeader {
     pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
     /// Angle of each row from straight ahead, rad in [0, 2 pi).
     pub azimuth_rad: [f32; MAX_AZIMUTHS],
-    /// Flags of each row: see `gyre_radar::scan::flag`.
+    /// Flags of each row: see `gyre_geometry::scan::flag`.
     pub azimuth_flags: [u8; MAX_AZIMUTHS],
 }
 

@@ -15,8 +15,7 @@ mod sweep_time;
 
 use std::f64::consts::TAU;
 
-use gyre_radar::scan::flag;
-use gyre_radar::{ScanSlot, Sense, SweepGeometry};
+use gyre_geometry::{ScanSlot, Sense, SweepGeometry, scan::flag};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -24,17 +23,21 @@ use rand_distr::StandardNormal;
 pub use self::antenna::Antenna;
 use self::beam_index::BeamIndex;
 pub use self::config::SensorConfig;
-use self::echoes::{Echo, View};
-use self::line_of_sight::LineOfSight;
-use self::spectrum::{NOISE_OVERLAP, RangeSpectrum};
-use self::sweep_poses::SweepPoses;
 pub use self::sweep_time::SweepTime;
-use crate::body::Moving;
-use crate::interpolate::interpolate;
-use crate::path::Path;
-use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
-use crate::stream::Stream;
-use crate::world::World;
+use self::{
+    echoes::{Echo, View},
+    line_of_sight::LineOfSight,
+    spectrum::{NOISE_OVERLAP, RangeSpectrum},
+    sweep_poses::SweepPoses,
+};
+use crate::{
+    body::Moving,
+    interpolate::interpolate,
+    path::Path,
+    profile::{Chirp, METADATA_BYTES, Receiver, Sampling},
+    stream::Stream,
+    world::World,
+};
 
 /// Size of each azimuth's part of a scan's random numbers, in words.
 const WORDS_PER_AZIMUTH: u128 = 1 << 24;

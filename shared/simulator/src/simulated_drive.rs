@@ -6,8 +6,10 @@ mod render_ahead;
 use std::path::PathBuf;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
-use gyre_geometry::samples::{RawFix, Sample};
-use gyre_radar::{OwnedScan, ScanSlot};
+use gyre_geometry::{
+    OwnedScan, ScanSlot,
+    samples::{RawFix, Sample},
+};
 use render_ahead::Ahead;
 
 use crate::{

@@ -2,19 +2,21 @@
 
 use std::sync::Arc;
 
-use gyre_geometry::Pose;
-use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_geometry::{OwnedScan, Pose, ScanLimits, ScanSlot, SweepGeometry};
 use nalgebra::Point2;
 
-use crate::cars::Cars;
-use crate::config::{MAX_SCANS, Realism, SimulationConfig};
-use crate::error::SimulatorError;
-use crate::path::Path;
-use crate::profile::Sampling;
-use crate::route::Route;
-use crate::sensor::{Scene, Sensor, SweepTime};
-use crate::world::World;
-use crate::{scenery, tunnel};
+use crate::{
+    cars::Cars,
+    config::{MAX_SCANS, Realism, SimulationConfig},
+    error::SimulatorError,
+    path::Path,
+    profile::Sampling,
+    route::Route,
+    scenery,
+    sensor::{Scene, Sensor, SweepTime},
+    tunnel,
+    world::World,
+};
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
 /// Readers check that the year is plausible, and it is fixed so that a configuration always gives

@@ -1,19 +1,16 @@
 //! Datasets of each format: written, read by the readers for real data, interrupted, resumed, and
 //! streamed without a disk.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
+use std::{collections::BTreeMap, fs, path::Path};
 
-use crate::common::all_files;
 use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, read_trajectory};
-use gyre_geometry::Pose;
-use gyre_radar::OwnedScan;
-use gyre_simulator::output::OutputConfig;
+use gyre_geometry::{OwnedScan, Pose};
 use gyre_simulator::{
     HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
-    write_dataset,
+    output::OutputConfig, write_dataset,
 };
+
+use crate::common::all_files;
 
 const FORMATS: [OutputFormat; 3] = [
     OutputFormat::Oxford,

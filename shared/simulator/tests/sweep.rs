@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use gyre_geometry::Twist;
-use gyre_radar::{OwnedScan, ScanLimits};
-use gyre_simulator::body::{NO_BODY, Scatterer, Wall};
-use gyre_simulator::profile::{Profile, Sampling};
+use gyre_geometry::{OwnedScan, ScanLimits, Twist};
 use gyre_simulator::{
-    Body, Path, Realism, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime, World,
+    Body, Path, Realism, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime,
+    World,
+    body::{NO_BODY, Scatterer, Wall},
+    profile::{Profile, Sampling},
 };
 use nalgebra::Point2;
 

@@ -3,9 +3,9 @@
 use std::{collections::BTreeMap, path::{Path, PathBuf}, env, fs};
 
 use gyre_datasets::write_tum;
-use gyre_geometry::pose;
+use gyre_geometry::{pose, OwnedScan};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::{OwnedScan, Trajectory};
+use gyre_radar::Trajectory;
 use gyre_slam::{estimation::{Constraint, G2o}, localisation::{DriveSearch, Localiser, Map}, Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose};
 use gyre_worlds::{drive::{DriveConfig, DriveKind}, weather::WeatherConfig, SimulatedDrive, SimulationConfig};
 

@@ -1,12 +1,10 @@
 //! Corrupted copies of recordings: only the scans of the plan are hit, each by what its fault says.
 #![allow(clippy::unwrap_used)]
 
-use std::fs;
-use std::num::NonZeroUsize;
-use std::path::Path;
+use std::{fs, num::NonZeroUsize, path::Path};
 
 use gyre_datasets::DatasetOptions;
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use gyre_worlds::{SimulationConfig, write_dataset};
 use tempfile::TempDir;
 

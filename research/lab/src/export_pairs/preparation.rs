@@ -4,10 +4,9 @@
 use std::collections::VecDeque;
 
 use gyre_configuration::{Configuration, terminal::Failure};
-use gyre_geometry::{Pose, Twist, xy_yaw};
+use gyre_geometry::{Pose, Twist, xy_yaw, PolarScan};
 use gyre_masking::MaskKind;
 use gyre_matching::{odometry::{Odometry, OdometryError, SearchConfig}, RefinementKind};
-use gyre_radar::PolarScan;
 use half::{f16, slice::HalfFloatSliceExt};
 
 /// A network masks what networks are trained on.

@@ -5,7 +5,7 @@ use std::{hint::black_box, time::Instant};
 use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_masking::{MaskKind, network::Network};
 use gyre_matching::{odometry::Odometry, JointMatch, Refined};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use ndarray::Array3;
 
 use crate::models::Model;

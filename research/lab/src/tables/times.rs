@@ -1,7 +1,7 @@
 //! Table IIIa: how long mask, search and refinement take for a pair of scans, as far as a row has
 //! them, on one thread of this process.
 
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use gyre_configuration::terminal::Failure;
 use serde_json::json;
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 
 /// Shades of grey: four bits a pixel keep a picture of noise small.
 const SHADES: f64 = 15.0;

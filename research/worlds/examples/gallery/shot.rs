@@ -2,15 +2,8 @@
 
 use std::sync::Arc;
 
-use gyre_geometry::Pose;
-use gyre_geometry::Twist;
-use gyre_radar::{OwnedScan, ScanLimits};
-use gyre_worlds::profile::Profile;
-use gyre_worlds::weather::WeatherConfig;
-use gyre_worlds::{
-    Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SimulationConfig, Simulator,
-    SimulatorError, SweepTime, World,
-};
+use gyre_geometry::{Pose, Twist, OwnedScan, ScanLimits};
+use gyre_worlds::{profile::Profile, weather::WeatherConfig, Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SimulatorError, SweepTime, World};
 
 const SEED: u64 = 1;
 const EPOCH_US: i64 = 1_547_132_400_000_000;

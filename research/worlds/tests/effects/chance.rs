@@ -1,8 +1,7 @@
 //! Random events: their frequency, and that they change nothing else.
 
-use gyre_radar::OwnedScan;
-use gyre_worlds::profile::{METADATA_BYTES, Profile};
-use gyre_worlds::{Effects, SimulationConfig, Simulator};
+use gyre_geometry::OwnedScan;
+use gyre_worlds::{profile::{METADATA_BYTES, Profile}, Effects, SimulationConfig, Simulator};
 
 use super::scene::{Setup, changed, only, power, powers};
 

@@ -2,11 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use gyre_geometry::Pose;
-use gyre_radar::OwnedScan;
-use gyre_worlds::body::Wall;
-use gyre_worlds::profile::Profile;
-use gyre_worlds::{Effects, Path};
+use gyre_geometry::{Pose, OwnedScan};
+use gyre_worlds::{body::Wall, profile::Profile, Effects, Path};
 use nalgebra::Point2;
 
 use super::scene::{Setup, db, is_dark, mean_db, power, powers};

@@ -2,10 +2,8 @@
 
 use std::f64::consts::PI;
 
-use gyre_geometry::Twist;
-use gyre_radar::OwnedScan;
-use gyre_worlds::body::Wall;
-use gyre_worlds::{Body, Effects};
+use gyre_geometry::{Twist, OwnedScan};
+use gyre_worlds::{body::Wall, Body, Effects};
 use nalgebra::{Point2, Vector2};
 
 use super::scene::{Setup, db, is_dark, peak_bin, peak_db, post};

@@ -3,11 +3,8 @@
 use std::f64::consts::TAU;
 
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::Pose;
-use gyre_geometry::Twist;
-use gyre_radar::OwnedScan;
-use gyre_worlds::profile::Profile;
-use gyre_worlds::{Body, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset};
+use gyre_geometry::{Pose, Twist, OwnedScan};
+use gyre_worlds::{profile::Profile, Body, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset};
 use nalgebra::{Point2, Vector2};
 
 use super::scene::{Setup, only, peak_bin, post, power};

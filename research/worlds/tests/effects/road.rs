@@ -1,9 +1,7 @@
 //! Effects of a real road: hills, heights, foliage, bounces, vibration, dirt and calibration.
 
-use gyre_radar::OwnedScan;
-use gyre_worlds::body::Wall;
-use gyre_worlds::profile::Profile;
-use gyre_worlds::{Effects, Realism, Relief, SimulationConfig, Simulator, write_dataset};
+use gyre_geometry::OwnedScan;
+use gyre_worlds::{body::Wall, profile::Profile, Effects, Realism, Relief, SimulationConfig, Simulator, write_dataset};
 use nalgebra::Point2;
 
 use super::scene::{Setup, db, mean_db, peak_bin, peak_db, post, power, powers};

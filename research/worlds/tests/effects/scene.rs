@@ -2,14 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use gyre_geometry::Twist;
-use gyre_radar::{OwnedScan, ScanLimits};
-use gyre_worlds::body::{NO_BODY, Scatterer};
-use gyre_worlds::profile::{Profile, Receiver, Sampling};
-use gyre_worlds::weather::WeatherConfig;
-use gyre_worlds::{
-    Body, Effects, Movers, Path, Relief, Scene, Sensor, SensorConfig, SweepTime, World,
-};
+use gyre_geometry::{Twist, OwnedScan, ScanLimits};
+use gyre_worlds::{body::{NO_BODY, Scatterer}, profile::{Profile, Receiver, Sampling}, weather::WeatherConfig, Body, Effects, Movers, Path, Relief, Scene, Sensor, SensorConfig, SweepTime, World};
 use nalgebra::Point2;
 
 /// A scene and a radar. Default: Oxford's radar at rest, without effects.

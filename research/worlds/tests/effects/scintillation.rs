@@ -1,7 +1,6 @@
 //! Fluctuation of a single post's echo.
 
-use gyre_geometry::Twist;
-use gyre_radar::OwnedScan;
+use gyre_geometry::{Twist, OwnedScan};
 use gyre_worlds::body::{NO_BODY, Scatterer};
 use nalgebra::Point2;
 

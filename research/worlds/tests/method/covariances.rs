@@ -3,9 +3,8 @@
 use std::{fs, path::Path};
 
 use gyre_datasets::open_source;
-use gyre_geometry::{ComposedMotion, Pose, UncertainMotion, xy_yaw};
+use gyre_geometry::{ComposedMotion, Pose, UncertainMotion, xy_yaw, OwnedScan};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::OwnedScan;
 use gyre_worlds::{SimulatedDrive, SimulationConfig};
 use nalgebra::{Matrix3, Vector3};
 

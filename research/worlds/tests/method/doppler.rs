@@ -1,8 +1,8 @@
 //! The velocity by Doppler on simulated scans of a RAS6, against the true one. A table.
 
 use gyre_datasets::open_source;
-use gyre_radar::{DopplerEstimator, NoDoppler, OwnedScan, PointsConfig};
-use gyre_geometry::samples::DopplerVelocity;
+use gyre_geometry::{OwnedScan, samples::DopplerVelocity};
+use gyre_radar::{DopplerEstimator, NoDoppler, PointsConfig};
 use gyre_worlds::{OutputFormat, Profile, Realism, SimulatedDrive, SimulationConfig};
 use nalgebra::{Matrix2, Vector2};
 

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 
 use gyre_datasets::open_source;
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use gyre_worlds::{SimulatedDrive, SimulationConfig};
 
 const PROJECT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");

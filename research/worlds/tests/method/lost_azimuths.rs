@@ -1,9 +1,9 @@
 //! Azimuths that the host has lost, in simulated recordings of RADIATE.
 
 use gyre_datasets::{DatasetOptions, LostAzimuthOption, open_source};
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, LostAzimuths, OwnedScan};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
+use gyre_radar::PlacedRows;
 use gyre_worlds::{OutputFormat, Profile, SimulatedDrive, SimulationConfig};
 
 const SCANS: usize = 60;

@@ -4,9 +4,8 @@
 use std::{fmt::Write as _, path::Path};
 
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
-use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw, samples::{DopplerKind, GyroKind, WheelsKind}};
+use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw, samples::{DopplerKind, GyroKind, WheelsKind}, OwnedScan};
 use gyre_matching::{odometry::{Odometry, OdometryConfig}, InitialGuess};
-use gyre_radar::OwnedScan;
 use gyre_worlds::{GyroProfile, OutputFormat, Profile, SimulatedDrive, SimulationConfig, TunnelConfig, drive::DriveConfig};
 use nalgebra::Vector3;
 

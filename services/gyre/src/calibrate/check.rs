@@ -3,9 +3,12 @@
 use gyre_calibration::{Found, toml};
 use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_datasets::{DatasetOptions, ground_truth::read_trajectory};
-use gyre_geometry::samples::{GyroKind, WheelsKind};
+use gyre_geometry::{
+    OwnedScan,
+    samples::{GyroKind, WheelsKind},
+};
 use gyre_matching::odometry::Odometry;
-use gyre_radar::{OwnedScan, Trajectory};
+use gyre_radar::Trajectory;
 use gyre_results::{judgement::judge, truth_of};
 
 use super::CalibrateArguments;

@@ -2,8 +2,7 @@
 
 use axum::body::Bytes;
 use gyre_contract::MaskedHeader;
-use gyre_geometry::SparsePoint;
-use gyre_radar::{PolarScan, Sense};
+use gyre_geometry::{PolarScan, Sense, SparsePoint};
 use ndarray::ArrayView2;
 use serde_json::json;
 
@@ -132,7 +131,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::f32::consts::TAU;
 
-    use gyre_radar::SweepGeometry;
+    use gyre_geometry::SweepGeometry;
     use ndarray::Array2;
 
     use super::*;

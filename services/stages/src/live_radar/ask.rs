@@ -8,7 +8,7 @@ use std::{
 
 use gyre_colossus::{Address, Configuration, Event, Message, Request, SweepAssembler};
 use gyre_datasets::DatasetOptions;
-use gyre_radar::ScanLimits;
+use gyre_geometry::ScanLimits;
 use thiserror::Error;
 
 use crate::live_radar::{Settings, connection::RadarSocket};

@@ -6,8 +6,7 @@
 use std::{collections::VecDeque, mem};
 
 use gyre_contract::{Item, NumberedBy, Scan, Window, flag};
-use gyre_geometry::samples::Sample;
-use gyre_radar::continues;
+use gyre_geometry::{continues, samples::Sample};
 use gyre_stage::{Launch, inputs::Action};
 use gyre_transport::{
     Generation, Listener, Manifest, RunError,

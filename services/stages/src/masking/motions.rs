@@ -5,8 +5,7 @@
 use std::collections::BTreeMap;
 
 use gyre_contract::{Item, Motion, MotionEstimate, flag};
-use gyre_geometry::Twist;
-use gyre_radar::LostAzimuths;
+use gyre_geometry::{LostAzimuths, Twist};
 use gyre_stage::{Launch, source::Credit};
 use gyre_transport::{Listener, RunError, reader::Port};
 

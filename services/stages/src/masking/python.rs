@@ -2,8 +2,9 @@
 
 use std::{error::Error, path::Path};
 
+use gyre_geometry::{PolarScan, Sense};
 use gyre_masking::{Factors, MaskFunction};
-use gyre_radar::{PolarScan, RasterConfig, Sense};
+use gyre_radar::RasterConfig;
 use gyre_stage::{
     Launch,
     python_function::{Argument, Array, Function, Returned, Scan},

@@ -2,10 +2,9 @@
 
 use gyre_contract::{Item, Scan, Window, flag};
 use gyre_geometry::{
-    Twist,
+    LostAzimuths, Twist,
     samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate},
 };
-use gyre_radar::LostAzimuths;
 use gyre_stage::{
     Launch,
     inputs::{Action, Inputs},

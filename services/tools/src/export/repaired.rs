@@ -10,10 +10,8 @@ use std::{
 
 use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::{DatasetOptions, Format, LostAzimuthOption, find_ground_truth, stored_options};
-use gyre_radar::{
-    LostAzimuths, OwnedScan,
-    lost::{repair, stale_rows},
-};
+use gyre_geometry::{LostAzimuths, OwnedScan};
+use gyre_radar::lost::{repair, stale_rows};
 use gyre_storage::{StorageError, create_folder, write as write_file};
 
 use crate::{

@@ -3,9 +3,8 @@
 use gyre_colossus::Configuration as Radar;
 use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::{ReadError, correct_eccentricity, middle_ns};
-use gyre_radar::{
-    OwnedScan, PlacedRows, PolarScan, Sense, SweepGeometry, lost::stale_rows, scan::flag,
-};
+use gyre_geometry::{OwnedScan, PolarScan, Sense, SweepGeometry, scan::flag};
+use gyre_radar::{PlacedRows, lost::stale_rows};
 use gyre_recording::bags::{BagWriter, Kept, Topic};
 use gyre_ros2_messages::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
@@ -264,7 +263,7 @@ impl Scans {
 
 #[cfg(test)]
 mod tests {
-    use gyre_radar::ScanLimits;
+    use gyre_geometry::ScanLimits;
 
     use super::*;
 

@@ -15,12 +15,12 @@ use gyre_contract::{
     PoseHeader, flag,
 };
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
-use gyre_geometry::Pose;
+use gyre_geometry::{LostAzimuths, Pose};
 use gyre_journal::{
     self as journal, JournalError,
     objects::{LoggedObjects, listed},
 };
-use gyre_radar::{LostAzimuths, Trajectory};
+use gyre_radar::Trajectory;
 use gyre_recording::{
     Recording,
     bags::{BagWriter, Kept},

@@ -5,13 +5,13 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_datasets::{Dataset, ScanSamples};
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{LostAzimuths, OwnedScan, SparsePoint};
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_matching::{
     RefinementConfig, RefinementKind,
     odometry::{Odometry, OdometryConfig},
 };
-use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
+use gyre_radar::PlacedRows;
 use ndarray::Array2;
 
 use crate::masks::inspection::{Inspection, MaskedRaster};

@@ -14,7 +14,7 @@ use std::{
 use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::Dataset;
-use gyre_radar::{OwnedScan, PolarScan, SweepGeometry, scan::flag};
+use gyre_geometry::{OwnedScan, PolarScan, SweepGeometry, scan::flag};
 
 use crate::radar_server::RadarServerArguments;
 

@@ -2,8 +2,8 @@
 
 use std::{error::Error, process::ExitCode};
 
+use gyre_geometry::PolarScan;
 use gyre_masking::{Factors, MaskFunction};
-use gyre_radar::PolarScan;
 use ndarray::ArrayView2;
 
 #[derive(Debug)]

@@ -1,10 +1,12 @@
 //! The radar's description of itself: 20 bytes, then a protobuf.
 
-use gyre_radar::MAX_AZIMUTHS;
+use gyre_geometry::MAX_AZIMUTHS;
 use thiserror::Error;
 
-use crate::malformed::{Malformed, head};
-use crate::protobuf::fields;
+use crate::{
+    malformed::{Malformed, head},
+    protobuf::fields,
+};
 
 /// Bytes before the protobuf.
 pub(crate) const CONFIGURATION_BYTES: usize = 20;

@@ -9,11 +9,13 @@ mod seam;
 use std::cmp::Ordering;
 
 use gyre_datasets::{DatasetOptions, correct_eccentricity, middle_ns};
-use gyre_radar::{ScanLimits, ScanSlot, Sense, SweepGeometry};
+use gyre_geometry::{ScanLimits, ScanSlot, Sense, SweepGeometry};
 
-use crate::configuration::{BadConfiguration, Configuration};
-use crate::kept::KeptAzimuth;
-use crate::message::Azimuth;
+use crate::{
+    configuration::{BadConfiguration, Configuration},
+    kept::KeptAzimuth,
+    message::Azimuth,
+};
 pub use counters::Counters;
 use rows::{Empty, RowWriter};
 use seam::{Grid, Seam};

@@ -1,10 +1,12 @@
 //! Median time to read a scan: `GYRE_DATA=... cargo bench -p gyre-datasets --bench read`.
 
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
 
 use gyre_datasets::{DatasetOptions, OpenError, inspect, open};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 
 const ROUNDS: usize = 200;
 

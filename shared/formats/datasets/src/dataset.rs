@@ -30,8 +30,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_geometry::samples::{BagFixes, Sample, SampleKind};
-use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
+use gyre_geometry::{
+    samples::{BagFixes, Sample, SampleKind},
+    scan::{ScanLimits, ScanSlot, SweepGeometry},
+};
 
 pub use dataset_toml::stored_options;
 pub use detect::is_dataset;

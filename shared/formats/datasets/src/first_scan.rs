@@ -1,6 +1,7 @@
 //! The first scan of a recording, which shows the capabilities of its radar.
 
-use gyre_radar::{NoDoppler, OwnedScan, check_chirps};
+use gyre_geometry::OwnedScan;
+use gyre_radar::{NoDoppler, check_chirps};
 
 use crate::Dataset;
 

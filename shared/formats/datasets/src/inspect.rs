@@ -11,13 +11,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_geometry::{PolarScan, scan::OwnedScan};
+use gyre_radar::{DopplerEstimator, NoDoppler, PointsConfig, trajectory::Trajectory};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::dataset::{Dataset, DatasetOptions, Format, OpenError, open};
-use gyre_radar::scan::OwnedScan;
-use gyre_radar::trajectory::Trajectory;
-use gyre_radar::{DopplerEstimator, NoDoppler, PointsConfig, PolarScan};
 
 /// Maximum number of pixels to decode, about 2 s; longer datasets are subsampled.
 const PIXEL_BUDGET: usize = 250_000_000;

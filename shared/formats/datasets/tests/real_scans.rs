@@ -1,13 +1,12 @@
 //! The readers on real scans.
 
-use std::f32::consts::TAU;
-use std::path::Path;
+use std::{f32::consts::TAU, path::Path};
+
+use gyre_datasets::{Dataset, DatasetOptions, Format, open, read_trajectory};
+use gyre_geometry::{OwnedScan, Sense, scan::flag};
+use gyre_radar::{DopplerEstimator, lost::stale_rows};
 
 use crate::common::{read, real};
-use gyre_datasets::{Dataset, DatasetOptions, Format, open, read_trajectory};
-use gyre_radar::lost::stale_rows;
-use gyre_radar::scan::flag;
-use gyre_radar::{DopplerEstimator, OwnedScan, Sense};
 
 fn opened(folder: &str) -> Option<Box<dyn Dataset>> {
     Some(open(&real(folder)?, &DatasetOptions::default()).unwrap())

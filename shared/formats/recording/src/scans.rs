@@ -11,8 +11,7 @@ use gyre_datasets::{
     DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError, Properties, ReadError,
     turn_ns,
 };
-use gyre_geometry::samples::Sample;
-use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_geometry::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, samples::Sample};
 
 use crate::{Entry, Recording, Stored, image::read};
 

@@ -11,7 +11,7 @@ use std::{
 use bytemuck::{Zeroable, bytes_of};
 use gyre_contract::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_datasets::DatasetOptions;
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use gyre_recording::{
     Head, Incoming, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,
     file::McapFile, open, open_recording,

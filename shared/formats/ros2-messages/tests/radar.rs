@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use gyre_colossus::Configuration;
-use gyre_radar::{OwnedScan, ScanLimits, scan::flag};
+use gyre_geometry::{OwnedScan, ScanLimits, scan::flag};
 use gyre_ros2_messages::{
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg},

@@ -1,15 +1,15 @@
 //! The drive: its scans as points, and its track by odometry under assumed facts.
 
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
+use gyre_geometry::{
+    OwnedScan, PolarScan, Pose, Sense, SparsePoint, Twist, UncertainMotion,
+    scan::{ScanError, flag},
+};
 use gyre_masking::MaskerError;
 use gyre_matching::{
     Refiner, SettingError,
     odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError},
 };
-use gyre_radar::{
-    OwnedScan, PointExtractor, PolarScan, Sense,
-    scan::{ScanError, flag},
-};
+use gyre_radar::PointExtractor;
 
 use crate::{
     FactVector, OwnReflections,

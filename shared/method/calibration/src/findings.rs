@@ -6,7 +6,7 @@ mod tests;
 
 use std::{fmt, iter};
 
-use gyre_radar::SweepGeometry;
+use gyre_geometry::SweepGeometry;
 
 use crate::{Calibration, CalibrationError, Drive, FACTS, Fact, FactVector, OwnReflections};
 pub use constant::Constant;

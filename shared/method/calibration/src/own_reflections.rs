@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use gyre_radar::PolarScan;
+use gyre_geometry::PolarScan;
 
 const CELL_M: f64 = 0.25;
 const CELLS: usize = (OwnReflections::REACH_M / CELL_M) as usize;

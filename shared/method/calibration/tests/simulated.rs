@@ -4,8 +4,8 @@
 
 use gyre_calibration::{Calibration, Drive, Fact, calibrate};
 use gyre_datasets::DatasetOptions;
+use gyre_geometry::OwnedScan;
 use gyre_matching::odometry::OdometryConfig;
-use gyre_radar::OwnedScan;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 
 const ECCENTRICITY_RAD: f64 = 4e-3;

@@ -1,4 +1,5 @@
-use gyre_radar::{ScanError, SettingError, raster::RasterError};
+use gyre_geometry::{ScanError, SettingError};
+use gyre_radar::raster::RasterError;
 use thiserror::Error;
 
 use crate::{MaskingConfigError, network::NetworkError};

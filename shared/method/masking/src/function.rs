@@ -2,8 +2,7 @@
 
 use std::{error::Error, fmt};
 
-use gyre_geometry::Twist;
-use gyre_radar::PolarScan;
+use gyre_geometry::{PolarScan, Twist};
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::{MaskError, Sweep, compensation::CompensatedRaster};

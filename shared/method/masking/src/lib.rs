@@ -16,8 +16,8 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
-use gyre_geometry::{SparsePoint, Twist};
-use gyre_radar::{PointExtractor, PointsConfig, PolarScan, ScanError, raster::RasterConfig};
+use gyre_geometry::{PolarScan, ScanError, SparsePoint, Twist};
+use gyre_radar::{PointExtractor, PointsConfig, raster::RasterConfig};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 pub use backend::{Backend, Provider};

@@ -73,9 +73,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::tests::{AZIMUTHS, empty};
-    use gyre_radar::{
-        OwnedScan, PointExtractor, PointsConfig, RasterConfig, Sense, raster::Rasteriser,
-    };
+    use gyre_geometry::{OwnedScan, Sense};
+    use gyre_radar::{PointExtractor, PointsConfig, RasterConfig, raster::Rasteriser};
     use ndarray::Array2;
 
     const BINS: usize = 500;

@@ -1,5 +1,4 @@
-use gyre_geometry::Twist;
-use gyre_radar::PolarScan;
+use gyre_geometry::{PolarScan, Twist};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep<'a> {

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use gyre_radar::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
+use gyre_geometry::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
 use ndarray::Array2;
 
 pub(crate) const AZIMUTHS: usize = 400;

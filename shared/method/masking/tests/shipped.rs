@@ -8,12 +8,13 @@ use std::{
 
 use crate::common::{backends, learned, learned_by, runtime_is_installed, sweep, unlearned};
 use gyre_datasets::DatasetOptions;
+use gyre_geometry::OwnedScan;
 use gyre_masking::{
     Backend, Masker,
     model::{Card, Model},
     network::Network,
 };
-use gyre_radar::{OwnedScan, PointsConfig, RasterConfig};
+use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use ndarray::Array3;
 

@@ -5,9 +5,8 @@
 use std::{env, error::Error, path::Path};
 
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::xy_yaw;
+use gyre_geometry::{OwnedScan, xy_yaw};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::OwnedScan;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();

@@ -8,8 +8,9 @@
 use std::{env, error::Error, fs, io, path::Path};
 
 use gyre_datasets::{DatasetOptions, ScanSamples, write_tum};
+use gyre_geometry::OwnedScan;
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::{OwnedScan, Trajectory};
+use gyre_radar::Trajectory;
 use serde::Deserialize;
 
 #[derive(Default, Deserialize)]

@@ -14,13 +14,14 @@ mod tests;
 
 use std::f32::consts::TAU;
 
-use gyre_geometry::samples::DopplerVelocity;
-use thiserror::Error;
-
-use crate::scan::{PolarScan, ScanError, flag};
 use fit::Fit;
+use gyre_geometry::{
+    samples::DopplerVelocity,
+    scan::{PolarScan, ScanError, flag},
+};
 use rows::Rows;
 use shifts::Shifts;
+use thiserror::Error;
 
 /// The least Doppler coefficient, s: with a smaller one no speed of a vehicle shifts an echo by a
 /// bin.

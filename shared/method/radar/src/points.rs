@@ -12,13 +12,14 @@ mod range_cells;
 #[cfg(test)]
 mod tests;
 
-use gyre_geometry::{SettingError, SparsePoint, check, check_bounds};
+use gyre_geometry::{
+    SettingError, SparsePoint, check, check_bounds,
+    scan::{PolarScan, ScanError, Sense},
+};
 use peaks::{Beam, Peak};
 use range_cells::RangeCells;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use crate::scan::{PolarScan, ScanError, Sense};
 
 /// The weight of a point is 1 from this power above the floor on.
 pub const WEIGHT_CAP: f32 = 60.0;

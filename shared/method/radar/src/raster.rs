@@ -18,15 +18,16 @@ use std::fmt;
 
 use bearing_table::BearingTable;
 use cells::Cells;
-use gyre_geometry::{SettingError, Twist, check, check_bounds};
+use gyre_geometry::{
+    SettingError, Twist, check, check_bounds,
+    scan::{PolarScan, ScanError, Sense, SweepGeometry},
+};
 use kernels::locate::{self, Lookup, Taps};
 use ndarray::ArrayViewMut2;
 use polar_image::PolarImage;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sweep_motion::SweepMotion;
-
-use crate::scan::{PolarScan, ScanError, Sense, SweepGeometry};
 pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 
 pub const MAX_CELLS_PER_SIDE: usize = 4096;

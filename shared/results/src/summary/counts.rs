@@ -353,7 +353,7 @@ impl Gaps {
 #[cfg(test)]
 mod tests {
     use gyre_contract::RefinementRecord;
-    use gyre_radar::LostAzimuths;
+    use gyre_geometry::LostAzimuths;
 
     use super::*;
 

@@ -7,9 +7,8 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_datasets::{Dataset, ScanSamples};
-use gyre_geometry::Twist;
+use gyre_geometry::{OwnedScan, Twist};
 use gyre_matching::odometry::{Odometry, Outcome};
-use gyre_radar::OwnedScan;
 use gyre_slam::localisation::Observation;
 
 pub struct Scans {

@@ -1,12 +1,9 @@
 //! The rows of a scan.
 
-use gyre_radar::scan::flag;
-use gyre_radar::{ScanLimits, ScanSlot};
+use gyre_geometry::{ScanLimits, ScanSlot, scan::flag};
 
-use super::counters::Counters;
-use super::powers::PowerOrder;
-use crate::configuration::Configuration;
-use crate::message::Powers;
+use super::{counters::Counters, powers::PowerOrder};
+use crate::{configuration::Configuration, message::Powers};
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Empty {

@@ -5,7 +5,7 @@ use gyre_colossus::{
     SweepAssembler,
 };
 use gyre_datasets::DatasetOptions;
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 
 /// 2019-01-10 14:37:26 UTC, ns.
 pub const START_NS: i64 = 1_547_131_046_353_776_001;

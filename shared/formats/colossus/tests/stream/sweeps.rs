@@ -4,7 +4,7 @@ use gyre_colossus::{
     Azimuth, ByteOrder, ClockFormat, Configuration, Counters, Powers, SweepAssembler,
 };
 use gyre_datasets::{DatasetOptions, correct_eccentricity};
-use gyre_radar::{OwnedScan, Sense, scan::flag};
+use gyre_geometry::{OwnedScan, Sense, scan::flag};
 use proptest::prelude::*;
 
 use crate::support::{Assembly, START_NS, assembled, configuration, turns};

@@ -1,17 +1,22 @@
 //! The images of a dataset: their files, order and size.
 
-use std::collections::BTreeSet;
-use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
 
-use super::error::{OpenError, ReadError};
-use super::format::Format;
-use super::image_list::{self, file_number};
-use super::image_size::ImageSize;
-use super::image_source::ImageSource;
-use super::png_image::{self, ImageReader};
-use super::stamp;
-use gyre_radar::scan::MAX_AZIMUTHS;
+use gyre_geometry::scan::MAX_AZIMUTHS;
+
+use super::{
+    error::{OpenError, ReadError},
+    format::Format,
+    image_list::{self, file_number},
+    image_size::ImageSize,
+    image_source::ImageSource,
+    png_image::{self, ImageReader},
+    stamp,
+};
 
 const FIRST_TRIES: usize = 8;
 /// Number of images, spread over all of them, whose sizes are looked at.

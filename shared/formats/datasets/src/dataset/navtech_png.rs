@@ -3,10 +3,9 @@
 
 use std::path::Path;
 
-use super::error::ReadError;
-use super::image_size::ImageSize;
-use super::stamp;
-use gyre_radar::scan::{check_sweep, flag};
+use gyre_geometry::scan::{check_sweep, flag};
+
+use super::{error::ReadError, image_size::ImageSize, stamp};
 
 pub(crate) const METADATA_BYTES: usize = 11;
 /// Minimum share of consecutive rows that differ in byte 10 if it is the direction of the chirp.

@@ -1,25 +1,29 @@
 //! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford,
 //! OORD, Boreas, MulRan (Oxford format) and FoMo.
 
-use super::detect::Found;
-use super::eccentricity::correct_eccentricity;
-use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
-use super::error::{OpenError, ReadError};
-use super::first_image::{FirstImage, NamedBy};
-use super::format::Format;
-use super::image_size::ImageSize;
-use super::images::Images;
-use super::navtech_notes::observations;
-use super::navtech_png::{self, METADATA_BYTES};
-use super::options::{AzimuthSource, DatasetOptions};
-use super::profiles::{Profile, ScanTime};
-use super::row_order;
-use super::stamp;
-use super::{Dataset, Properties};
-use gyre_radar::MAX_INTERVAL_NS;
-use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
-use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::{ops::RangeInclusive, path::PathBuf};
+
+use gyre_geometry::{
+    MAX_INTERVAL_NS,
+    scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry},
+};
+
+use super::{
+    Dataset, Properties,
+    detect::Found,
+    eccentricity::correct_eccentricity,
+    encoder::{EncoderTurn, FIRST_TURNS, encoder_counts},
+    error::{OpenError, ReadError},
+    first_image::{FirstImage, NamedBy},
+    format::Format,
+    image_size::ImageSize,
+    images::Images,
+    navtech_notes::observations,
+    navtech_png::{self, METADATA_BYTES},
+    options::{AzimuthSource, DatasetOptions},
+    profiles::{Profile, ScanTime},
+    row_order, stamp,
+};
 
 /// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of
 /// metadata.

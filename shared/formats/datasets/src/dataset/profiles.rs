@@ -15,12 +15,15 @@
 //!   Only the Python kit gives 5595 and no offset. Real rows decide: 400 with steps of 14 are 5600,
 //!   from 7 to 5593, so that half a step remains at either end.
 
-use super::first_image::{FirstImage, NamedBy};
-use super::format::Format;
-use super::navtech_png::ByteTen;
-use super::options::{AzimuthSource, DatasetOptions};
-use super::stamp::SECOND_NS;
-use gyre_radar::scan::{Sense, SweepGeometry};
+use gyre_geometry::scan::{Sense, SweepGeometry};
+
+use super::{
+    first_image::{FirstImage, NamedBy},
+    format::Format,
+    navtech_png::ByteTen,
+    options::{AzimuthSource, DatasetOptions},
+    stamp::SECOND_NS,
+};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ScanTime {

@@ -4,20 +4,25 @@
 //! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, of receipt at the
 //! host: after a stall they are late by up to 1.4 s. The sensor clock is reconstructed.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::io::ErrorKind;
-use std::path::Path;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::ErrorKind,
+    path::Path,
+};
 
-use super::detect::Found;
-use super::error::OpenError;
-use super::images::Images;
-use super::options::DatasetOptions;
-use super::sensor_clock::SensorClock;
-use super::stale::StaleRows;
-use super::stamp::{self, SECOND_NS};
-use super::transposed::{TransposedScans, Turn};
-use gyre_radar::MAX_INTERVAL_NS;
+use gyre_geometry::MAX_INTERVAL_NS;
 use gyre_storage::quoted;
+
+use super::{
+    detect::Found,
+    error::OpenError,
+    images::Images,
+    options::DatasetOptions,
+    sensor_clock::SensorClock,
+    stale::StaleRows,
+    stamp::{self, SECOND_NS},
+    transposed::{TransposedScans, Turn},
+};
 
 /// The largest list of stamps: months of scans.
 const MAX_LIST_BYTES: u64 = 1 << 30;

@@ -1,15 +1,17 @@
 //! The order of images whose names are no times: the order of the stamps of their first rows,
 //! unless it mixes two clocks.
 
-use std::collections::BTreeSet;
-use std::ffi::OsString;
+use std::{collections::BTreeSet, ffi::OsString};
 
-use super::first_image::FirstImage;
-use super::image_list;
-use super::images::Images;
-use super::navtech_png::{METADATA_BYTES, RowMetadata};
-use super::stamp;
-use gyre_radar::MAX_INTERVAL_NS;
+use gyre_geometry::MAX_INTERVAL_NS;
+
+use super::{
+    first_image::FirstImage,
+    image_list,
+    images::Images,
+    navtech_png::{METADATA_BYTES, RowMetadata},
+    stamp,
+};
 
 const BY_TIME: &str = "The files are not named by times of their scans: they are ordered by the times of their first rows.";
 const BY_NAME: &str = "The files are not named by times of their scans: they are in the order of their names, \

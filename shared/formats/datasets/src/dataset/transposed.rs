@@ -1,17 +1,21 @@
 //! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth
 //! from straight ahead.
 
-use super::detect::Found;
-use super::eccentricity::correct_eccentricity;
-use super::error::{OpenError, ReadError};
-use super::images::Images;
-use super::navtech_png::fill_uniform;
-use super::options::{DatasetOptions, LostAzimuthOption};
-use super::profiles::Profile;
-use super::stale::StaleRows;
-use super::{Dataset, Properties};
-use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
 use std::path::PathBuf;
+
+use gyre_geometry::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, flag};
+
+use super::{
+    Dataset, Properties,
+    detect::Found,
+    eccentricity::correct_eccentricity,
+    error::{OpenError, ReadError},
+    images::Images,
+    navtech_png::fill_uniform,
+    options::{DatasetOptions, LostAzimuthOption},
+    profiles::Profile,
+    stale::StaleRows,
+};
 
 /// Side of the blocks of the transposition, pixels: a cache line.
 const BLOCK: usize = 64;

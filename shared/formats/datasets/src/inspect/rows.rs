@@ -1,11 +1,10 @@
 //! Rows of the scans: validity, losses, chirps, azimuth steps, and ringing near the sensor.
 
+use gyre_geometry::scan::{PolarScan, Sense, SweepGeometry, flag};
+use gyre_radar::{lost::stale_rows, median};
 use serde_json::json;
 
 use super::Report;
-use gyre_radar::lost::stale_rows;
-use gyre_radar::median;
-use gyre_radar::scan::{PolarScan, Sense, SweepGeometry, flag};
 
 /// Number of scans whose powers are averaged to detect ringing.
 const POWER_SCANS: usize = 40;

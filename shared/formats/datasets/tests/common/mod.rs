@@ -1,12 +1,14 @@
 //! Small generated datasets, and paths of real ones.
 #![allow(dead_code, clippy::unwrap_used)]
 
-use std::fmt::Display;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::{
+    fmt::Display,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use gyre_datasets::{Dataset, ReadError};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use tempfile::TempDir;
 
 /// 2019-01-10 14:37:26 UTC, us.

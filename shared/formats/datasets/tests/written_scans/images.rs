@@ -1,10 +1,9 @@
 //! Images: powers, transposition, corrupt files, sizes.
 
-use std::f32::consts::TAU;
-use std::fs;
+use std::{f32::consts::TAU, fs};
 
 use gyre_datasets::{DatasetOptions, Format, open, reopen};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 
 use super::{assert_rejected, first_scan, folder, opened};
 use crate::common::{

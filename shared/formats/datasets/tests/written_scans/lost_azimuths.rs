@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use gyre_datasets::{DatasetOptions, Format, LostAzimuthOption, inspect, open};
-use gyre_radar::{lost::stale_rows, scan::flag};
+use gyre_geometry::scan::flag;
+use gyre_radar::lost::stale_rows;
 
 use super::{folder, opened, options};
 use crate::common::{PERIOD_US, START_US, read, write_png, write_radiate};

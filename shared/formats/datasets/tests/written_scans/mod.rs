@@ -14,7 +14,7 @@ use std::path::Path;
 
 use crate::common::{assert_refused, read};
 use gyre_datasets::{Dataset, DatasetOptions, ReadError, open};
-use gyre_radar::OwnedScan;
+use gyre_geometry::OwnedScan;
 use tempfile::TempDir;
 
 fn folder() -> TempDir {

@@ -3,7 +3,7 @@
 use std::f32::consts::TAU;
 
 use gyre_datasets::{AzimuthSource, Format, open};
-use gyre_radar::scan::flag;
+use gyre_geometry::scan::flag;
 
 use super::{first_scan, first_scan_with, folder, options};
 use crate::common::{START_US, Sweep, assert_refused, read, write_oxford};

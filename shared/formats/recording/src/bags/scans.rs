@@ -13,9 +13,12 @@ use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, Format, ImageSize, OpenError,
     Properties, ReadError, turn_ns,
 };
-use gyre_geometry::samples::{BagFixes, Sample, SampleKind};
-use gyre_radar::{ScanSlot, SweepGeometry};
+use gyre_geometry::{
+    ScanSlot, SweepGeometry,
+    samples::{BagFixes, Sample, SampleKind},
+};
 use gyre_ros2_messages::radar::DescribedRadar;
+use index::{Entry, Index};
 
 use crate::bags::{
     Message, RecordingError,
@@ -25,7 +28,6 @@ use crate::bags::{
     fixes, samples,
     topics::Topics,
 };
-use index::{Entry, Index};
 
 pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;

@@ -16,7 +16,7 @@ use std::{
 
 use gyre_colossus::Configuration;
 use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError, middle_ns};
-use gyre_radar::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
+use gyre_geometry::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
 use gyre_recording::bags::{BagWriter, Kept, is_bag, open};
 use gyre_ros2_messages::{
     Ros2Message, decode, encode,

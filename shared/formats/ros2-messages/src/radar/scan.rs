@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use gyre_colossus::{ClockFormat, Configuration};
-use gyre_radar::{PolarScan, scan::flag};
+use gyre_geometry::{PolarScan, scan::flag};
 
 use crate::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},

@@ -5,12 +5,9 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_geometry::Twist;
-use gyre_masking::networks::runtime;
-use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_radar::{
-    OwnedScan, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, scan::flag,
-};
+use gyre_geometry::{OwnedScan, ScanLimits, Sense, SweepGeometry, Twist, scan::flag};
+use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep, networks::runtime};
+use gyre_radar::{PointsConfig, RasterConfig};
 use ndarray::Array2;
 
 /// Cells per side of the models with a reference computation.

@@ -1,11 +1,9 @@
 use gyre_geometry::{
-    ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion,
+    ComposedMotion, LostAzimuths, OdometryMotion, PolarScan, SparsePoint, Twist, UncertainMotion,
     samples::{DopplerVelocity, Gyro, Sample, Wheels, with_yaw_rate},
 };
 use gyre_masking::Masker;
-use gyre_radar::{
-    DopplerEstimator, LostAzimuthFinder, LostAzimuths, NoDoppler, PlacedRows, PolarScan,
-};
+use gyre_radar::{DopplerEstimator, LostAzimuthFinder, NoDoppler, PlacedRows};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
@@ -64,7 +62,7 @@ impl Odometry {
     }
 
     /// Registers the next scan: estimates its motion from the previous scan, and its pose. A scan
-    /// that is not later than the previous one, or by more than [`gyre_radar::MAX_INTERVAL_NS`],
+    /// that is not later than the previous one, or by more than [`gyre_geometry::MAX_INTERVAL_NS`],
     /// starts a new chain as after [`Odometry::restart`].
     ///
     /// `samples` are the gyro's and the wheels' samples that come with the scan

@@ -1,9 +1,8 @@
 use gyre_geometry::{
-    SparsePoint, Twist,
+    PolarScan, SparsePoint, Twist, continues,
     samples::{DopplerVelocity, GyroTurn, WheelDistance},
 };
 use gyre_masking::{Masker, Sweep};
-use gyre_radar::{PolarScan, continues};
 use ndarray::{Array2, ArrayView2};
 
 use crate::{Aiding, odometry::OdometryError};

@@ -1,10 +1,10 @@
 use std::error::Error as StdError;
 
-use crate::{JointMatch, Refined, SettingError, ShapeError};
-use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
+use gyre_geometry::{OdometryMotion, ScanError, Twist, UncertainMotion};
 use gyre_masking::{MaskError, MaskerError};
-use gyre_radar::ScanError;
 use thiserror::Error;
+
+use crate::{JointMatch, Refined, SettingError, ShapeError};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Registered {

@@ -4,9 +4,8 @@
 use std::{fs, path::Path};
 
 use gyre_datasets::open_source;
-use gyre_geometry::{ComposedMotion, xy_yaw};
+use gyre_geometry::{ComposedMotion, OwnedScan, xy_yaw};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::OwnedScan;
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use nalgebra::Vector3;
 

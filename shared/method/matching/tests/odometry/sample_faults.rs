@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
 use gyre_geometry::{
-    Pose, SparsePoint,
+    OwnedScan, Pose, SparsePoint,
     samples::{Gyro, GyroKind, Sample, SampleKind, Wheels, WheelsKind},
     xy_yaw,
 };
@@ -14,7 +14,6 @@ use gyre_matching::{
     Refiner,
     odometry::{Odometry, OdometryConfig},
 };
-use gyre_radar::OwnedScan;
 use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
 
 /// A drive that was masked and searched once: what refinement gets, scan by scan.

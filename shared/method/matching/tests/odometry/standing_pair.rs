@@ -3,9 +3,8 @@
 use std::{env, fs, path::Path};
 
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::xy_yaw;
+use gyre_geometry::{OwnedScan, xy_yaw};
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_radar::OwnedScan;
 
 /// The motion between the first two scans: x, y (m), yaw (rad).
 fn motion(recording: &Path, hold: bool) -> [f64; 3] {

@@ -1,7 +1,8 @@
 //! The powers of a scan above its noise, in cells deep enough that the fastest vehicle shifts
 //! echoes by [`REACH`] of them.
 
-use crate::{raster::kernels::window::sum_pieces, scan::PolarScan};
+use crate::raster::kernels::window::sum_pieces;
+use gyre_geometry::scan::PolarScan;
 
 /// Largest shift of echoes in cells, either way.
 pub(super) const REACH: usize = 31;

@@ -7,7 +7,7 @@ use super::{
     alternates_at,
     rows::{REACH, Rows, WIDTH},
 };
-use crate::scan::{PolarScan, Sense};
+use gyre_geometry::scan::{PolarScan, Sense};
 
 pub(super) const LAGS: usize = 2 * REACH + 1;
 /// The mean of this many shifts on either side, about a metre, is subtracted from the correlation.

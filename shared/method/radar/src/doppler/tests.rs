@@ -6,10 +6,8 @@ use nalgebra::Vector2;
 use proptest::prelude::*;
 
 use super::{DopplerEstimator, NoDoppler, check_chirps};
-use crate::{
-    raster::tests::scene::Sensor,
-    scan::{OwnedScan, Sense, flag},
-};
+use crate::raster::tests::scene::Sensor;
+use gyre_geometry::scan::{OwnedScan, Sense, flag};
 
 const MIN_RANGE_M: f32 = 5.0;
 /// Width of the beam, standard deviation, and of an echo along the range, m.

@@ -6,7 +6,8 @@ mod passes;
 
 use gyre_simd::simd;
 
-use super::{LostAzimuths, MAX_GAPS, MAX_LOST, MAX_SINGLE, echoes::Echoes, prediction::Prediction};
+use super::{LostAzimuths, MAX_LOST, echoes::Echoes, prediction::Prediction};
+use gyre_geometry::{MAX_GAPS, MAX_SINGLE};
 use passes::{pass_backward, pass_forward};
 
 /// Largest turn of the whole scan against a prediction, in azimuths to either side.

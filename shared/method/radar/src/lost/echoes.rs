@@ -5,7 +5,8 @@ use std::f32::consts::TAU;
 use gyre_simd::simd;
 
 use super::LostAzimuths;
-use crate::{raster::kernels::window::sum_pieces, scan::PolarScan};
+use crate::raster::kernels::window::sum_pieces;
+use gyre_geometry::scan::PolarScan;
 
 /// Depth of a cell, m: about a pulse's echo on a wall.
 const CELL_M: f32 = 0.7;

@@ -2,15 +2,15 @@
 
 use std::f32::consts::TAU;
 
-use gyre_geometry::{Pose, Twist};
+use gyre_geometry::{
+    Pose, Twist,
+    scan::{PolarScan, Sense},
+};
 use gyre_simd::simd;
 use nalgebra::Vector2;
 
 use super::echoes::{EchoRow, Echoes, Layout};
-use crate::{
-    raster::kernels::integer_below,
-    scan::{PolarScan, Sense},
-};
+use crate::raster::kernels::integer_below;
 
 /// Range for determining the time between two looks in one direction, m.
 const TYPICAL_M: f32 = 30.0;

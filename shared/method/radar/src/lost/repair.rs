@@ -1,5 +1,5 @@
 use super::{LostAzimuths, stale_rows};
-use crate::scan::PolarScan;
+use gyre_geometry::scan::PolarScan;
 
 /// Writes the powers of a scan, azimuth x range bin: the powers of each measured row at its
 /// azimuth, and between two rows an interpolation of both by their distance. `lost` has as many as
@@ -33,7 +33,7 @@ pub fn repair(scan: &PolarScan<'_>, lost: &LostAzimuths, into: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::{OwnedScan, ScanLimits, flag};
+    use gyre_geometry::scan::{OwnedScan, ScanLimits, flag};
 
     const AZIMUTHS: usize = 12;
     const BINS: usize = 2;

@@ -2,10 +2,12 @@
 
 use std::{collections::BTreeSet, f64::consts::TAU};
 
-use gyre_geometry::Twist;
+use gyre_geometry::{
+    Twist,
+    scan::{OwnedScan, ScanLimits, Sense},
+};
 
 use super::*;
-use crate::scan::{OwnedScan, ScanLimits, Sense};
 
 const AZIMUTHS: usize = 400;
 const BINS: usize = 576;

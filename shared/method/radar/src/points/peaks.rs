@@ -1,7 +1,7 @@
 //! Non-maximum suppression across azimuths.
 
 use super::range_cells::RangeCells;
-use crate::scan::PolarScan;
+use gyre_geometry::scan::PolarScan;
 use std::f32::consts::{PI, TAU};
 
 const BLOCK: usize = 16;

@@ -2,7 +2,7 @@
 
 use super::PointsConfig;
 use crate::raster::kernels::window::sum_pieces;
-use crate::scan::{PolarScan, flag};
+use gyre_geometry::scan::{PolarScan, flag};
 
 /// Maximum number of bins per cell: the sum must fit an i16, which every vector unit can compare.
 const MAX_BINS_PER_CELL: usize = 128;

@@ -1,13 +1,18 @@
 #![allow(clippy::unwrap_used)]
 
-use super::{PointExtractor, PointsConfig, WEIGHT_CAP};
-use crate::raster::tests::scene::Sensor;
-use crate::scan::{OwnedScan, Sense, flag};
-use gyre_geometry::{SparsePoint, Twist};
+use gyre_geometry::{
+    SparsePoint, Twist,
+    scan::{OwnedScan, Sense, flag},
+};
 use nalgebra::{Point2, Vector2};
 use proptest::prelude::*;
-use serde::Deserialize;
-use serde::de::value::{Error as ValueError, MapDeserializer};
+use serde::{
+    Deserialize,
+    de::value::{Error as ValueError, MapDeserializer},
+};
+
+use super::{PointExtractor, PointsConfig, WEIGHT_CAP};
+use crate::raster::tests::scene::Sensor;
 
 const UNSET: SparsePoint = SparsePoint {
     x_m: f32::NAN,

@@ -1,4 +1,4 @@
-use crate::scan::{MAX_AZIMUTHS, PolarScan};
+use gyre_geometry::scan::{MAX_AZIMUTHS, PolarScan};
 use std::f64::consts::TAU;
 
 /// Nodes per turn: ten between Navtech azimuths. The table is linear between nodes, so its error is
@@ -86,7 +86,7 @@ impl BearingTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::{OwnedScan, ScanLimits};
+    use gyre_geometry::scan::{OwnedScan, ScanLimits};
 
     /// The table of a scan with azimuths (degrees) and times (seconds) only.
     fn measured(azimuths: &[(f32, f64)]) -> BearingTable {

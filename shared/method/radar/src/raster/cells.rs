@@ -1,6 +1,6 @@
-use crate::scan::Sense;
-use std::f32::consts::SQRT_2;
-use std::f64::consts::TAU;
+use std::{f32::consts::SQRT_2, f64::consts::TAU};
+
+use gyre_geometry::scan::Sense;
 
 pub(super) const BLOCK: usize = 32;
 

@@ -2,9 +2,12 @@
 //! the depth of a cell. Its columns are finer than a cell but coarser than a bin, so that it stays
 //! in the cache.
 
-use super::kernels::window::{self, Window};
-use super::sweep_motion::SweepMotion;
-use crate::scan::{PolarScan, SweepGeometry};
+use gyre_geometry::scan::{PolarScan, SweepGeometry};
+
+use super::{
+    kernels::window::{self, Window},
+    sweep_motion::SweepMotion,
+};
 
 /// Row-major samples, in units of 1/256 of the scan's power: one row per azimuth, the first one
 /// repeated at the end, and empty columns on both sides. Bilinear sampling uses a window of one

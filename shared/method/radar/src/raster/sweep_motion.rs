@@ -1,6 +1,9 @@
+use gyre_geometry::{
+    Twist,
+    scan::{PolarScan, Sense},
+};
+
 use super::RasterError;
-use crate::scan::{PolarScan, Sense};
-use gyre_geometry::Twist;
 
 /// Maximum turn of the sensor between the scan's stamp and any azimuth, rad.
 pub const MAX_TURN_RAD: f64 = 2.0;

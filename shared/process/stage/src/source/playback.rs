@@ -1,7 +1,7 @@
 //! Playing: which scan is next, when it is due, and when the window admits it.
 
 use gyre_contract::{Scan, run::SourceConfig};
-use gyre_radar::continues;
+use gyre_geometry::continues;
 use gyre_transport::{RunError, clock, wake, writer::Draft};
 
 use super::{Attempts, Feed, PAUSE, Source, Unreadable, hop, pace::Pace, position::Position};

@@ -8,7 +8,7 @@ use std::{
 };
 
 use gyre_colossus::{Azimuth, Counters, FoundClock, RadarClock, SweepAssembler};
-use gyre_radar::{OwnedScan, ScanLimits};
+use gyre_geometry::{OwnedScan, ScanLimits};
 use gyre_ros2_messages::radar::DescribedRadar;
 
 use crate::bags::{

@@ -1,11 +1,11 @@
 //! Motion compensation: the raster of a moving sensor shows the scene at the middle of the sweep.
 
-use super::scene::{Sensor, miss_cells, raster};
-use crate::raster::{RasterConfig, Sampling};
-use crate::scan::Sense;
-use gyre_geometry::Twist;
+use gyre_geometry::{Twist, scan::Sense};
 use nalgebra::Point2;
 use proptest::prelude::*;
+
+use super::scene::{Sensor, miss_cells, raster};
+use crate::raster::{RasterConfig, Sampling};
 
 const SIGMA_M: f64 = 1.0;
 

@@ -2,7 +2,7 @@
 
 use super::scene::{Sensor, centre_m, miss_cells, raster};
 use crate::raster::{RasterConfig, Sampling};
-use crate::scan::Sense;
+use gyre_geometry::scan::Sense;
 use nalgebra::Point2;
 use proptest::prelude::*;
 use std::f64::consts::TAU;

@@ -2,7 +2,7 @@
 
 use super::scene::{Sensor, centre_m, raster};
 use crate::raster::{RasterConfig, Rasteriser, Sampling};
-use crate::scan::OwnedScan;
+use gyre_geometry::scan::OwnedScan;
 use ndarray::Array2;
 use std::f64::consts::TAU;
 

@@ -1,14 +1,19 @@
 //! Any input gives an error or a raster of finite powers, and the same one each time.
 
-use super::scene::{STAMP_NS, Sensor, raster};
-use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling};
-use crate::scan::{OwnedScan, Sense};
-use gyre_geometry::Twist;
+use gyre_geometry::{
+    Twist,
+    scan::{OwnedScan, Sense},
+};
 use nalgebra::Point2;
 use ndarray::{Array2, ArrayViewMut2, s};
 use proptest::prelude::*;
-use serde::Deserialize;
-use serde::de::value::{Error as ValueError, MapDeserializer};
+use serde::{
+    Deserialize,
+    de::value::{Error as ValueError, MapDeserializer},
+};
+
+use super::scene::{STAMP_NS, Sensor, raster};
+use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 
 fn small() -> RasterConfig {
     RasterConfig {

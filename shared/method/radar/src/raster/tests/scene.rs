@@ -1,11 +1,15 @@
 //! Synthetic scans: exact measurements of Gaussian scatterers by a moving sensor.
 
-use crate::raster::{RasterConfig, Rasteriser};
-use crate::scan::{OwnedScan, ScanLimits, Sense, SweepGeometry, flag};
-use gyre_geometry::Twist;
+use std::f64::consts::TAU;
+
+use gyre_geometry::{
+    Twist,
+    scan::{OwnedScan, ScanLimits, Sense, SweepGeometry, flag},
+};
 use nalgebra::Point2;
 use ndarray::Array2;
-use std::f64::consts::TAU;
+
+use crate::raster::{RasterConfig, Rasteriser};
 
 /// Bytes before each row, so that rows do not start at byte 0.
 const METADATA: usize = 11;

@@ -2,9 +2,9 @@
 
 use std::{f64::consts::PI, fs, path::Path};
 
-use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
+use gyre_geometry::{OwnedScan, Pose, SparsePoint, Twist, pose, xy_yaw};
 use gyre_matching::{RefinementConfig, Submap};
-use gyre_radar::{OwnedScan, PointExtractor, PointsConfig};
+use gyre_radar::{PointExtractor, PointsConfig};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_slam::estimation::places::{
     Describer, Descriptor, KeyframeSelector, LoopVerifier, MAX_NEIGHBOURS, PlaceIndex,
