@@ -14,6 +14,7 @@ use gyre_matching::{
     SequentialRotation, TranslationConfig, TranslationSearch,
 };
 use gyre_radar::{PointsConfig, RasterConfig};
+use gyre_stages::estimates;
 use ndarray::Array2;
 
 const N: usize = 31;
@@ -205,15 +206,19 @@ fn masked_rasters() {
                 let pair = pair.ok_or("its rasters do not fit their headers")?;
                 let found =
                     rotations.next(*seq, pair.later, pair.earlier, pair.earlier_changed, None)?;
-                let estimate = found.as_ref().map(RotationEstimate::from);
+                let estimate = found.as_ref().map(estimates::rotation);
                 let estimate = estimate.unwrap_or_default();
                 let angle = angle.map_or(estimate, rotation);
                 if let Some(earlier) = pair.earlier {
-                    let by_halves = translation.search(pair.later, earlier, &estimate.into())?;
-                    translation.search(pair.later, earlier, &angle.into())?;
+                    let by_halves = translation.search(
+                        pair.later,
+                        earlier,
+                        &estimates::rotation_match(&estimate),
+                    )?;
+                    translation.search(pair.later, earlier, &estimates::rotation_match(&angle))?;
                     let jointly = joint.search(pair.later, earlier)?;
                     assert_finite(&estimate, &by_halves);
-                    assert_finite(&RotationEstimate::from(&jointly.rotation), &jointly.motion);
+                    assert_finite(&estimates::rotation(&jointly.rotation), &jointly.motion);
                 }
                 Ok(())
             });
@@ -264,7 +269,7 @@ fn motions_and_points() {
                 let motion = header.motion.motion().motion;
                 let refined = refiner.refine(1, later, earlier, &motion, interval_s);
                 let refined = MotionHeader {
-                    motion: header.motion.refined(&refined),
+                    motion: estimates::refined(&header.motion, &refined),
                     ..header
                 };
                 let pose = compose(Some(&PoseHeader::default()), &refined);

@@ -5,6 +5,7 @@ use gyre_geometry::SparsePoint;
 use gyre_journal::JournalError;
 use gyre_transport::{RunError, reader::Received};
 
+pub mod estimates;
 pub mod followers;
 pub mod live_radar;
 pub mod masking;

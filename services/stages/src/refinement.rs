@@ -15,7 +15,7 @@ use gyre_stage::{
 };
 use gyre_transport::{RunError, writer::Draft};
 
-use crate::{points, unusable};
+use crate::{estimates, points, unusable};
 
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let points: PointsConfig = launch.section("points")?;
@@ -79,7 +79,7 @@ impl Stage for RefinementStage {
                     &motion.motion().motion,
                     motion.interval_ns as f64 * 1e-9,
                 );
-                let mut motion = motion.refined(&refined);
+                let mut motion = estimates::refined(&motion, &refined);
                 let (turn, distance) = (masked.turn(), masked.distance());
                 motion.refinement.gyro_turn_rad = turn.map_or(0.0, |it| it.yaw_rad);
                 motion.refinement.wheel_distance_m = distance.map_or(0.0, |it| it.distance_m);

@@ -3,8 +3,7 @@
 use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
-use gyre_geometry::{MAX_INTERVAL_NS, OdometryMotion, Twist, covariance, pose, xy_yaw};
-use gyre_matching::{MotionMatch, RotationMatch};
+use gyre_geometry::{MAX_INTERVAL_NS, OdometryMotion, Twist, covariance, pose};
 
 use crate::{
     check::{covariance as check_covariance, fields, finite, planar, require, within},
@@ -42,31 +41,6 @@ impl RotationEstimate {
         within("variance_rad2", self.variance_rad2, 0.0..=f64::MAX)?;
         within("runner_up_rad", self.runner_up_rad, turn)?;
         finite(fields![self; score runner_up_score])
-    }
-}
-
-impl From<&RotationMatch> for RotationEstimate {
-    fn from(found: &RotationMatch) -> Self {
-        let runner_up = found.runner_up;
-        Self {
-            angle_rad: found.angle_rad,
-            variance_rad2: found.variance_rad2,
-            score: found.score,
-            runner_up_rad: runner_up.map_or(0.0, |runner_up| runner_up.angle_rad),
-            runner_up_score: runner_up.map_or(0.0, |runner_up| runner_up.score),
-        }
-    }
-}
-
-impl From<RotationEstimate> for RotationMatch {
-    /// Converts without the runner-up, which no search needs.
-    fn from(rotation: RotationEstimate) -> Self {
-        Self {
-            angle_rad: rotation.angle_rad,
-            variance_rad2: rotation.variance_rad2,
-            score: rotation.score,
-            runner_up: None,
-        }
     }
 }
 
@@ -142,40 +116,6 @@ impl MotionEstimate {
         finite(fields![self; score runner_up_score])?;
         self.rotation.check()?;
         self.refinement.check()
-    }
-
-    pub fn from_search(found: &MotionMatch, rotation: RotationEstimate, interval_ns: i64) -> Self {
-        Self {
-            x_m: found.x_m,
-            y_m: found.y_m,
-            yaw_rad: found.yaw_rad,
-            covariance: covariance::pack(&found.covariance),
-            drift_share: 1.0,
-            scale_sigma: 0.0,
-            interval_ns,
-            score: found.score,
-            runner_up_score: found.runner_up.map_or(0.0, |runner_up| runner_up.score),
-            rotation,
-            searched: [found.x_m, found.y_m, found.yaw_rad],
-            refinement: RefinementRecord::default(),
-        }
-    }
-
-    /// Returns the motion after refinement. The searched motion stays beside it.
-    #[must_use]
-    pub fn refined(&self, refined: &gyre_matching::Refined) -> Self {
-        let motion = &refined.motion;
-        let [x_m, y_m, yaw_rad] = xy_yaw(&motion.motion);
-        Self {
-            x_m,
-            y_m,
-            yaw_rad,
-            covariance: covariance::pack(&motion.covariance),
-            drift_share: motion.drift_share,
-            scale_sigma: motion.scale_sigma,
-            refinement: refined.into(),
-            ..*self
-        }
     }
 
     pub fn motion(&self) -> OdometryMotion {

@@ -1,7 +1,6 @@
 //! The record of a refinement in the messages that carry a motion.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_matching::{InitialGuess, Outcome, Verdict};
 
 use crate::check::{code, fields, finite};
 
@@ -111,50 +110,5 @@ impl RefinementRecord {
             overlap support gyro_turn_rad gyro_scale gyro_bias_radps gyro_bias_sigma_radps
             wheel_distance_m wheel_scale wheel_scale_sigma doppler_scale doppler_scale_sigma
         ])
-    }
-}
-
-impl From<&gyre_matching::Refined> for RefinementRecord {
-    fn from(refined: &gyre_matching::Refined) -> Self {
-        Self {
-            outcome: match refined.outcome {
-                Outcome::Refined => outcome::REFINED,
-                Outcome::Weak => outcome::WEAK,
-                Outcome::Predicted => outcome::PREDICTED,
-            },
-            initial_guess: match refined.guess {
-                InitialGuess::Prediction => initial_guess::PREDICTION,
-                InitialGuess::Search => initial_guess::SEARCH,
-                InitialGuess::YawOffset => initial_guess::YAW_OFFSET,
-                InitialGuess::AlongWalls => initial_guess::ALONG_WALLS,
-            },
-            overlap: refined.overlap,
-            support: refined.support,
-            stationary: refined.stationary.into(),
-            gyro: match refined.gyro.map(|of| of.verdict) {
-                None => gyro::NONE,
-                Some(Verdict::Agrees) => gyro::USED,
-                Some(Verdict::Doubted) => gyro::DOUBTED,
-                Some(Verdict::Refused) => gyro::REFUSED,
-            },
-            gyro_scale: refined.gyro.map_or(0.0, |of| of.scale),
-            gyro_bias_radps: refined.gyro.map_or(0.0, |bias| bias.rate_radps),
-            gyro_bias_sigma_radps: refined.gyro.map_or(0.0, |bias| bias.sigma_radps),
-            wheels: match refined.wheels {
-                None => wheels::NONE,
-                Some(of) if of.slip => wheels::SLIP,
-                Some(_) => wheels::USED,
-            },
-            wheel_scale: refined.wheels.map_or(0.0, |of| of.scale),
-            wheel_scale_sigma: refined.wheels.map_or(0.0, |of| of.sigma),
-            doppler: match refined.doppler {
-                None => doppler::NONE,
-                Some(of) if of.slip => doppler::REFUSED,
-                Some(_) => doppler::USED,
-            },
-            doppler_scale: refined.doppler.map_or(0.0, |of| of.scale),
-            doppler_scale_sigma: refined.doppler.map_or(0.0, |of| of.sigma),
-            ..Self::default()
-        }
     }
 }

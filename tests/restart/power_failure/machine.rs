@@ -224,7 +224,7 @@ impl Stages {
             interval_ns: INTERVAL_NS,
             ..MotionEstimate::default()
         };
-        found.refined(&refined)
+        gyre_stages::estimates::refined(&found, &refined)
     }
 }
 

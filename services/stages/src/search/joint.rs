@@ -12,6 +12,8 @@ use gyre_stage::{
 };
 use gyre_transport::{RunError, writer::Draft};
 
+use crate::estimates;
+
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: ExhaustiveConfig = launch.section("exhaustive")?;
@@ -41,8 +43,8 @@ impl Stage for JointStage {
             .transpose()
             .map_err(|error| input.current.malformed(error.to_string()))?;
         output.header().motion = found.map_or_else(MotionEstimate::default, |found| {
-            let rotation = (&found.rotation).into();
-            MotionEstimate::from_search(&found.motion, rotation, input.interval_ns())
+            let rotation = estimates::rotation(&found.rotation);
+            estimates::searched(&found.motion, rotation, input.interval_ns())
         });
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! The rotation-search stage: the rotation between consecutive scans from their magnitude spectra
 //! (Weston et al., Sec. III-C, step 1).
 
-use gyre_contract::{Masked, Rotation, RotationEstimate, StageId, run::StageCounters};
+use gyre_contract::{Masked, Rotation, StageId, run::StageCounters};
 use gyre_matching::{RotationConfig, RotationMatch, SequentialRotation};
 use gyre_radar::raster::RasterConfig;
 use gyre_stage::{
@@ -10,6 +10,8 @@ use gyre_stage::{
     stage,
 };
 use gyre_transport::{RunError, writer::Draft};
+
+use crate::estimates;
 
 /// Finds the rotation between two scans; `None` where the chain of motions starts.
 pub type Search = Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, RunError>>;
@@ -48,10 +50,7 @@ impl Stage for RotationStage {
         output: &mut Draft<Rotation>,
     ) -> Result<(), RunError> {
         let found = (self.search)(&input)?;
-        output.header().rotation = found
-            .as_ref()
-            .map(RotationEstimate::from)
-            .unwrap_or_default();
+        output.header().rotation = found.as_ref().map(estimates::rotation).unwrap_or_default();
         Ok(())
     }
 }

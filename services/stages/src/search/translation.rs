@@ -11,6 +11,8 @@ use gyre_stage::{
 };
 use gyre_transport::{RunError, writer::Draft};
 
+use crate::estimates;
+
 /// Finds the motion between two scans whose rotation is known; `None` where the chain of motions
 /// starts.
 pub type Search =
@@ -51,9 +53,9 @@ impl Stage for TranslationStage {
         output: &mut Draft<Motion>,
     ) -> Result<(), RunError> {
         let rotation = input.other.header().rotation;
-        let found = (self.search)(&input.pair, &rotation.into())?;
+        let found = (self.search)(&input.pair, &estimates::rotation_match(&rotation))?;
         output.header().motion = found.map_or_else(MotionEstimate::default, |found| {
-            MotionEstimate::from_search(&found, rotation, input.pair.interval_ns())
+            estimates::searched(&found, rotation, input.pair.interval_ns())
         });
         Ok(())
     }

@@ -1,6 +1,5 @@
 //! The logs of a run: the output of each stage, and the events of all.
 
-use gyre_client::last_line;
 use std::{
     fs::{self, File, OpenOptions},
     io::{self, PipeReader, PipeWriter, Seek, SeekFrom, Write},
@@ -11,6 +10,7 @@ use std::{
     thread,
 };
 
+use gyre_client::last_line;
 use gyre_transport::{Manifest, RunError};
 use rustix::{
     event::{PollFd, PollFlags, poll},

@@ -4,11 +4,11 @@
 
 mod passes;
 
+use gyre_geometry::{MAX_GAPS, MAX_SINGLE};
 use gyre_simd::simd;
+use passes::{pass_backward, pass_forward};
 
 use super::{LostAzimuths, MAX_LOST, echoes::Echoes, prediction::Prediction};
-use gyre_geometry::{MAX_GAPS, MAX_SINGLE};
-use passes::{pass_backward, pass_forward};
 
 /// Largest turn of the whole scan against a prediction, in azimuths to either side.
 const TURN: usize = 3;
@@ -333,8 +333,9 @@ const fn azimuth(row: usize, k: usize) -> isize {
 
 #[cfg(test)]
 mod tests {
-    use super::exponential;
     use proptest::prelude::*;
+
+    use super::exponential;
 
     proptest! {
         #[test]
