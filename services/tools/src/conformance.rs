@@ -16,7 +16,6 @@ mod result;
 mod rule;
 mod session;
 pub mod shadow;
-mod topics;
 
 use std::{io, path::Path, time::Duration};
 

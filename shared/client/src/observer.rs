@@ -130,10 +130,9 @@ impl ObservedRun {
         self.attach(M::ENTRY)
     }
 
-    /// Subscribes to the topic of this name; `None` for an unknown topic.
-    pub fn observe_topic(&self, topic: &str) -> Result<Option<TopicObserver<'_>>, RunError> {
-        let topic = gyre_contract::topic(topic);
-        topic.map(|topic| self.attach(topic)).transpose()
+    /// Subscribes to a topic whose messages are taken as bytes.
+    pub fn observe_topic(&self, topic: &'static Topic) -> Result<TopicObserver<'_>, RunError> {
+        self.attach(topic)
     }
 
     fn attach<M>(&self, topic: &'static Topic) -> Result<Observer<'_, M>, RunError> {

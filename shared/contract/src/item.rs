@@ -1,10 +1,11 @@
 //! The start of every message: the scan that it is about, and the time stamps of each stage.
 
-use bytemuck::{Pod, Zeroable};
-
 use gyre_geometry::{LostAzimuths, MAX_AZIMUTHS, MAX_GAPS};
 
-use crate::{check::require, limits::Window};
+use crate::{
+    limits::{Limits, Window},
+    wire::{Bounds, Described, field, require, wire},
+};
 
 pub mod flag {
     /// End of the stream: carries no scan and follows the last one in order.
@@ -73,17 +74,6 @@ impl FollowerId {
     }
 }
 
-/// Time stamps of one stage's work on a scan: `CLOCK_MONOTONIC`, ns; zero until then.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct Hop {
-    /// The last input was taken from its queue.
-    pub received_ns: i64,
-    pub started_ns: i64,
-    pub finished_ns: i64,
-    pub published_ns: i64,
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HopTimes {
     pub stage: StageId,
@@ -96,37 +86,48 @@ pub struct HopTimes {
 
 pub type Hops = [Hop; StageId::ALL.len()];
 
-/// The identity of a scan: its numbers and its times.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct Item {
-    /// Sequence number in the chain of motions: consecutive, from 0. Readers check it for gaps.
-    pub seq: u64,
-    /// Index of the scan in the recording, or the sensor's own count.
-    pub scan: u64,
-    /// The scan that this one is matched against (itself where the chain starts).
-    pub previous_scan: u64,
-    /// Sequence number at the source: a gap between consecutive items counts the scans dropped in
-    /// live mode.
-    pub published: u64,
-    /// The first number that its generation gives. Items of earlier generations with this number or
-    /// a later one are void: nothing was computed from them that lasts.
-    pub numbered_from: u64,
-    /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
-    pub stamp_ns: i64,
-    /// Time when the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`, ns.
-    /// Latency is measured from here.
-    pub due_ns: i64,
-    /// Generation of the numbers: it grows when masking (live mode) or the source of a sensor is
-    /// started, which may give a number again. 0 where the numbers follow from the recording.
-    pub generation: u32,
-    /// Bits of [`flag`].
-    pub flags: u32,
-    /// Gaps where azimuths were lost, as masking has found them: the first and the last row before
-    /// which a gap may be, and its number of azimuths, 0 behind the last gap. The pose keeps them
-    /// for a masking that is restarted.
-    pub lost: [[u16; 3]; MAX_GAPS],
-    pub hops: Hops,
+wire! {
+    /// Time stamps of one stage's work on a scan: `CLOCK_MONOTONIC`, ns; zero until then.
+    pub struct Hop = "gyre_hop_v1" {
+        /// The last input was taken from its queue.
+        pub received_ns: i64,
+        pub started_ns: i64,
+        pub finished_ns: i64,
+        pub published_ns: i64,
+    }
+}
+
+wire! {
+    /// The identity of a scan: its numbers and its times.
+    pub struct Item = "gyre_item_v6" {
+        /// Sequence number in the chain of motions: consecutive, from 0. Readers check it for gaps.
+        pub seq: u64,
+        /// Index of the scan in the recording, or the sensor's own count.
+        pub scan: u64,
+        /// The scan that this one is matched against (itself where the chain starts).
+        pub previous_scan: u64,
+        /// Sequence number at the source: a gap between consecutive items counts the scans dropped in
+        /// live mode.
+        pub published: u64,
+        /// The first number that its generation gives. Items of earlier generations with this number or
+        /// a later one are void: nothing was computed from them that lasts.
+        pub numbered_from: u64,
+        /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
+        pub stamp_ns: i64,
+        /// Time when the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`, ns.
+        /// Latency is measured from here.
+        pub due_ns: i64,
+        /// Generation of the numbers: it grows when masking (live mode) or the source of a sensor is
+        /// started, which may give a number again. 0 where the numbers follow from the recording.
+        pub generation: u32,
+        /// Bits of [`flag`].
+        pub flags: u32 [Bounds::Bits(flag::ALL as u64)],
+        /// Gaps where azimuths were lost, as masking has found them: the first and the last row before
+        /// which a gap may be, and its number of azimuths, 0 behind the last gap. The pose keeps them
+        /// for a masking that is restarted.
+        pub lost: [[u16; 3]; MAX_GAPS],
+        pub hops: Hops,
+    }
 }
 
 impl Item {
@@ -162,24 +163,29 @@ impl Item {
         self.lost[..lost.gaps().len()].copy_from_slice(lost.gaps());
     }
 
-    pub(crate) fn check(&self) -> Result<(), String> {
-        let known = self.flags & !flag::ALL == 0;
-        require(known, "flags", self.flags, "bits of 1 to 8")?;
+    pub(crate) fn check(&self, limits: &Limits) -> Result<(), String> {
+        Self::STRUCTURE.check(bytemuck::bytes_of(self), limits)?;
         let (scan, previous) = (self.scan, self.previous_scan);
         let expected = format_args!("at most {scan}, its scan");
-        require(previous <= scan, "previous_scan", previous, expected)?;
+        field(
+            "previous_scan",
+            require(previous <= scan, previous, expected),
+        )?;
         for [first, last, azimuths] in self.lost {
-            require(
-                first <= last && usize::from(last) + usize::from(azimuths) <= MAX_AZIMUTHS,
+            let end = usize::from(last) + usize::from(azimuths);
+            field(
                 "lost",
-                format_args!("{azimuths} before {first} to {last}"),
-                format_args!("two rows in order, within {MAX_AZIMUTHS} with the azimuths"),
+                require(
+                    first <= last && end <= MAX_AZIMUTHS,
+                    format_args!("{azimuths} before {first} to {last}"),
+                    format_args!("two rows in order, within {MAX_AZIMUTHS} with the azimuths"),
+                ),
             )?;
         }
         // The scan of the newest pose is sent again with its number.
         let (first, next) = (self.numbered_from, self.seq.saturating_add(1));
         let expected = format_args!("at most {next}, one more than its number");
-        require(first <= next, "numbered_from", first, expected)
+        field("numbered_from", require(first <= next, first, expected))
     }
 
     /// Returns whether all of these flags are set.

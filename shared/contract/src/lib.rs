@@ -5,7 +5,6 @@
 //! different versions reject each other's messages instead of misreading them.
 
 mod basis;
-mod check;
 pub mod control;
 mod follower;
 mod item;
@@ -19,22 +18,25 @@ mod refinement;
 pub mod run;
 mod sample_rates;
 mod scan;
+mod stages;
 mod topics;
+pub mod wire;
 
 pub use basis::{Basis, WitnessCounts};
 pub use follower::{
-    Correction, CorrectionHeader, Fix, FixHeader, ListedObject, Loop, LoopHeader, MAX_LISTED,
-    Objects, ObjectsHeader, fix_status,
+    CorrectionHeader, FixHeader, ListedObject, LoopHeader, MAX_LISTED, ObjectsHeader, fix_status,
 };
 pub use item::{FollowerId, Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window};
-pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
-pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender, Topic, WireType};
-pub use motion::{
-    Motion, MotionEstimate, MotionHeader, Refined, Rotation, RotationEstimate, RotationHeader,
-};
-pub use pose::{Pose, PoseHeader, compose};
+pub use masked::{MaskedHeader, MaskedParts, Pair, mask_kind};
+pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender, Topic, Use, WireType};
+pub use motion::{MotionEstimate, MotionHeader, RotationEstimate, RotationHeader};
+pub use pose::{PoseHeader, compose};
 pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 pub use sample_rates::{SampleHealth, SampleRates};
-pub use scan::{Scan, ScanHeader};
-pub use topics::{Footprint, GivenAnew, NumberedBy, topic, topics};
+pub use scan::ScanHeader;
+pub use stages::{StageTopics, composed};
+pub use topics::{
+    Correction, Fix, Footprint, GivenAnew, Loop, Masked, Motion, NumberedBy, Objects, Pose,
+    Refined, Rotation, Scan, all, named as topic_named, topic, topics,
+};

@@ -1,6 +1,5 @@
 //! `masked`: masked Cartesian rasters and the scan's sparse points.
 
-use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{
     SparsePoint, Twist,
     samples::{DopplerVelocity, GyroTurn, WheelDistance},
@@ -8,86 +7,89 @@ use gyre_geometry::{
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
-    check::{code, fields, finite, not_negative, of, require},
-    item::{Item, StageId},
-    limits::{History, Limits, TopicSizes, Window},
-    message::{ByteBlock, FloatBlock, Message, Sender, header},
+    item::Item,
+    limits::Limits,
+    message::{ByteBlock, FloatBlock, Header},
+    refinement::NO_YES,
+    wire::{Bounds, codes, describe, wire},
 };
 
-/// The payload is one raster if the mask takes one scan, or two (this scan and the previous one,
-/// both masked for this pair) if it takes both; then the scan's points. Each part starts at a whole
-/// block.
-#[derive(Debug)]
-pub enum Masked {}
-
-impl Message for Masked {
-    const TOPIC: &'static str = "masked";
-    const SENDER: Sender = Sender::Stage(&[StageId::Masking]);
-    // Rotation search, translation search and refinement.
-    const READERS: usize = 3;
-    const HISTORY: History = History::Stream;
-    type Header = MaskedHeader;
-    type Element = FloatBlock;
-
-    fn content_bytes(header: &Self::Header) -> Option<usize> {
-        let points = (header.points as usize).checked_mul(size_of::<SparsePoint>())?;
-        let rasters = header.first_point()?.checked_mul(size_of::<f32>())?;
-        rasters.checked_add(points)
-    }
-
-    /// In a run with SLAM pose-integration reads the points of keyframes.
-    fn sizes(window: &Window) -> TopicSizes {
-        window.queues(
-            Self::HISTORY,
-            Self::READERS + usize::from(window.logs_points()),
-        )
-    }
-
-    fn max_elements(limits: &Limits) -> usize {
-        limits.rasters * FloatBlock::count(limits.raster_cells)
-            + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
+codes! {
+    /// Values of [`MaskedHeader::mask`].
+    pub mod mask_kind: u32 {
+        NONE = "none",
+        /// Power up to a threshold is set to zero.
+        THRESHOLD = "threshold",
+        /// A network weights each cell above the threshold.
+        LEARNED = "learned",
     }
 }
-header!(MaskedHeader, "gyre_masked_header_v9");
 
-/// Values of [`MaskedHeader::mask`].
-pub mod mask_kind {
-    pub const NONE: u32 = 0;
-    /// Power up to a threshold is set to zero.
-    pub const THRESHOLD: u32 = 1;
-    /// A network weights each cell above the threshold.
-    pub const LEARNED: u32 = 2;
+wire! {
+    /// The geometry of a raster and the processing that led to it. What `has_*` is 1 for was
+    /// measured: the turn and the distance since the previous scan, and the velocity during this
+    /// one.
+    pub struct MaskedHeader = "gyre_masked_header_v9" {
+        pub item: Item,
+        /// Cells per side. Row 0 is far ahead, column 0 far left, the sensor is in the middle.
+        pub n: u32 [Bounds::OfRun(|it| it.side() as f64)],
+        /// Rasters in the payload: 1 or 2.
+        pub rasters: u32 [Bounds::OfRun(|it| it.rasters as f64)],
+        pub cell_m: f32 [Bounds::OfRun(|it| it.cell_m.into())],
+        /// See [`mask_kind`].
+        pub mask: u32 [Bounds::Codes(mask_kind::NAMES)],
+        /// The velocity used for motion compensation: x, y (m/s), yaw rate (rad/s); zero without
+        /// compensation.
+        pub twist: [f32; 3] [Bounds::Finite],
+        /// 1 if the scan is motion-compensated.
+        pub compensated: u32,
+        /// Number of points after the rasters.
+        pub points: u32 [Bounds::AtMost(|it| it.points as f64)],
+        /// Variance of the mean of the rows' azimuths, rad²: not zero where azimuths were lost at
+        /// places that are not known.
+        pub azimuth_variance_rad2: f32 [Bounds::NotNegative],
+        pub gyro: GyroTurn,
+        pub has_gyro: u64 [Bounds::Codes(NO_YES)],
+        pub wheels: WheelDistance,
+        pub has_wheels: u64 [Bounds::Codes(NO_YES)],
+        pub doppler: DopplerVelocity,
+        pub has_doppler: u64 [Bounds::Codes(NO_YES)],
+    }
 }
 
-/// The geometry of a raster and the processing that led to it. What `has_*` is 1 for was measured:
-/// the turn and the distance since the previous scan, and the velocity during this one.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct MaskedHeader {
-    pub item: Item,
-    /// Cells per side. Row 0 is far ahead, column 0 far left, the sensor is in the middle.
-    pub n: u32,
-    /// Rasters in the payload: 1 or 2.
-    pub rasters: u32,
-    pub cell_m: f32,
-    /// See [`mask_kind`].
-    pub mask: u32,
-    /// The velocity used for motion compensation: x, y (m/s), yaw rate (rad/s); zero without
-    /// compensation.
-    pub twist: [f32; 3],
-    /// 1 if the scan is motion-compensated.
-    pub compensated: u32,
-    /// Number of points after the rasters.
-    pub points: u32,
-    /// Variance of the mean of the rows' azimuths, rad²: not zero where azimuths were lost at
-    /// places that are not known.
-    pub azimuth_variance_rad2: f32,
-    pub gyro: GyroTurn,
-    pub has_gyro: u64,
-    pub wheels: WheelDistance,
-    pub has_wheels: u64,
-    pub doppler: DopplerVelocity,
-    pub has_doppler: u64,
+describe! {
+    /// The turn of the sensor from one scan to the next by the gyro, counter-clockwise.
+    GyroTurn = "gyre_gyro_turn_v1" {
+        /// From the stamp of the scan before to the stamp of the scan, rad, with the bias.
+        yaw_rad: f64 [Bounds::Finite],
+        /// Variance but for the bias and the scale, rad².
+        variance_rad2: f64 [Bounds::NotNegative],
+        interval_s: f64 [Bounds::NotNegative],
+        /// Mean rate during the sweep of the scan, rad/s, with the bias.
+        sweep_rate_radps: f64 [Bounds::Finite],
+    }
+
+    /// The distance from one scan to the next by the wheels, along the vehicle's path.
+    WheelDistance = "gyre_wheel_distance_v1" {
+        /// From the stamp of the scan before to the stamp of the scan, m; negative backwards.
+        distance_m: f64 [Bounds::Finite],
+        /// Variance but for the scale, m².
+        variance_m2: f64 [Bounds::NotNegative],
+        side_variance_m2: f64 [Bounds::NotNegative],
+        interval_s: f64 [Bounds::NotNegative],
+    }
+
+    /// The velocity of the radar by the Doppler shift of one scan, at the middle of its sweep:
+    /// along the axes of the radar, x forward, y left.
+    DopplerVelocity = "gyre_doppler_velocity_v1" {
+        /// x and y, m/s.
+        velocity_mps: [f64; 2] [Bounds::Finite],
+        /// Variance of x, covariance, variance of y, m²/s², but for the error of the Doppler
+        /// coefficient, which all scans share.
+        covariance: [f64; 3] [Bounds::Covariance2],
+        /// Number of bearings that agree with it.
+        bearings: u64,
+    }
 }
 
 /// The parts of a payload, to fill in: see [`MaskedHeader::split`].
@@ -110,56 +112,16 @@ pub struct Pair<'a> {
     pub earlier_changed: bool,
 }
 
-impl MaskedHeader {
-    /// Checks the sizes, the length of the payload, and that the points are finite. The rasters are
-    /// not looked at.
-    fn check_content(&self, payload: &[u8], limits: &Limits) -> Result<(), String> {
-        let values: &[f32] = bytemuck::cast_slice(payload);
-        let (n, rasters, points) = (self.n as usize, self.rasters as usize, self.points as usize);
-        require(n == limits.side(), "n", n, limits.side())?;
-        let fits = rasters == limits.rasters;
-        require(fits, "rasters", rasters, limits.rasters)?;
-        let fits = self.cell_m == limits.cell_m;
-        require(fits, "cell_m", self.cell_m, limits.cell_m)?;
-        let most = limits.points;
-        require(
-            points <= most,
-            "points",
-            points,
-            format_args!("at most {most}"),
-        )?;
-        code("mask", self.mask, mask_kind::LEARNED)?;
-        let [vx, vy, yaw_rate] = self.twist.map(f64::from);
-        finite([("twist[0]", vx), ("twist[1]", vy), ("twist[2]", yaw_rate)])?;
-        not_negative([("azimuth_variance_rad2", self.azimuth_variance_rad2.into())])?;
-        code("has_gyro", self.has_gyro, 1_u64)?;
-        code("has_wheels", self.has_wheels, 1_u64)?;
-        code("has_doppler", self.has_doppler, 1_u64)?;
-        let (gyro, wheels) = (&self.gyro, &self.wheels);
-        of("gyro.", finite(fields![gyro; yaw_rad sweep_rate_radps]))?;
-        of(
-            "gyro.",
-            not_negative(fields![gyro; variance_rad2 interval_s]),
-        )?;
-        of("wheels.", finite(fields![wheels; distance_m]))?;
-        let spread = fields![wheels; variance_m2 side_variance_m2 interval_s];
-        of("wheels.", not_negative(spread))?;
-        let ([vx, vy], [xx, xy, yy]) = (self.doppler.velocity_mps, self.doppler.covariance);
-        of(
-            "doppler.",
-            finite([
-                ("velocity_mps[0]", vx),
-                ("velocity_mps[1]", vy),
-                ("covariance[1]", xy),
-            ]),
-        )?;
-        of(
-            "doppler.",
-            not_negative([("covariance[0]", xx), ("covariance[2]", yy)]),
-        )?;
-        let points = self.points(values).ok_or_else(|| {
-            let bytes = payload.len();
-            format!("its payload of {bytes} bytes is shorter than its header states: {rasters} rasters of {n} x {n} cells and {points} points")
+impl Header for MaskedHeader {
+    /// Checks the length of the payload, and that the points are finite. The rasters are not looked
+    /// at.
+    fn check_content(&self, payload: &[u8], _: &Limits) -> Result<(), String> {
+        let points = self.points(bytemuck::cast_slice(payload)).ok_or_else(|| {
+            let (bytes, n, rasters) = (payload.len(), self.n, self.rasters);
+            format!(
+                "its payload of {bytes} bytes is shorter than its header states: {rasters} rasters of {n} x {n} cells and {} points",
+                self.points
+            )
         })?;
         let is_finite =
             |point: &SparsePoint| <[f32; 5]>::from(*point).iter().all(|it| it.is_finite());
@@ -172,6 +134,25 @@ impl MaskedHeader {
         }
     }
 
+    fn max_elements(limits: &Limits) -> usize {
+        limits.rasters * FloatBlock::count(limits.raster_cells)
+            + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
+    }
+
+    fn content_bytes(&self) -> Option<usize> {
+        let points = (self.points as usize).checked_mul(size_of::<SparsePoint>())?;
+        let rasters = self.first_point()?.checked_mul(size_of::<f32>())?;
+        rasters.checked_add(points)
+    }
+
+    fn words(&self, _: &[u8]) -> String {
+        let (n, cell_m, rasters, points) = (self.n, self.cell_m, self.rasters, self.points);
+        let s = if rasters == 1 { "" } else { "s" };
+        format!("{rasters} raster{s} of {n} x {n} cells of {cell_m} m, {points} points")
+    }
+}
+
+impl MaskedHeader {
     /// Returns the number of values of one raster, rounded up to whole blocks.
     fn raster_values(n: usize) -> Option<usize> {
         let cells = n.checked_mul(n)?;

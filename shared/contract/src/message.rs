@@ -9,16 +9,38 @@ use bytemuck::{Pod, Zeroable};
 use crate::{
     item::{FollowerId, Item, StageId, flag},
     limits::{History, Limits, TopicSizes, Window},
+    wire::{Described, Structure},
 };
 
 /// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its
 /// memory.
-pub trait Header: Pod + Default + Debug {
-    const TYPE_NAME: &'static str;
-    fn item(&self) -> &Item;
-    fn item_mut(&mut self) -> &mut Item;
-    /// Checks all but the item; the end of the stream has no content.
-    fn check(&self, payload: &[u8], limits: &Limits) -> Result<(), String>;
+pub trait Header: Described + Default + Debug {
+    fn item(&self) -> &Item {
+        bytemuck::from_bytes(&bytemuck::bytes_of(self)[..size_of::<Item>()])
+    }
+
+    fn item_mut(&mut self) -> &mut Item {
+        bytemuck::from_bytes_mut(&mut bytemuck::bytes_of_mut(self)[..size_of::<Item>()])
+    }
+
+    /// Checks what the bounds of single fields do not state; the end of the stream has no content.
+    fn check_content(&self, _payload: &[u8], _limits: &Limits) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// The longest payload, in elements. A topic without a payload still has one element.
+    fn max_elements(_limits: &Limits) -> usize {
+        1
+    }
+
+    /// Returns the bytes of the payload that the header describes; what follows them in memory has
+    /// no meaning. `None`: more than a payload can have.
+    fn content_bytes(&self) -> Option<usize> {
+        Some(0)
+    }
+
+    /// Returns the message in a line for a person, without the numbers of its scan.
+    fn words(&self, payload: &[u8]) -> String;
 }
 
 pub trait Element: Pod + Debug {
@@ -48,23 +70,33 @@ impl Sender {
     }
 }
 
+/// What observers do with a topic unless they are asked for others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// A recorder records it.
+    Recorded,
+    /// A link sends it.
+    Linked,
+    /// Its messages have payloads, and a link may lose some.
+    Large,
+    /// Each message replaces those before, and its numbers count what it consists of. So a gap is
+    /// no loss.
+    Replaces,
+}
+
 pub trait Message: Sized + 'static {
     const TOPIC: &'static str;
     const SENDER: Sender;
-    /// Number of processes that subscribe to the topic.
-    const READERS: usize;
+    /// The processes that subscribe to the topic.
+    const READERS: &'static [&'static str];
     const HISTORY: History;
+    const USES: &'static [Use];
     type Header: Header;
     /// The element that the payload is a slice of.
     type Element: Element;
 
     /// The same for programs that know the topic by its name alone.
-    const ENTRY: &'static Topic = &Topic::of::<Self>();
-
-    /// The longest payload, in elements. A topic without a payload still has one element.
-    fn max_elements(_limits: &Limits) -> usize {
-        1
-    }
+    const ENTRY: &'static Topic;
 
     /// Checks that a message keeps its contract, whatever program sent it. A receiver that has
     /// checked a message may rely on its numbers and on the length of its payload.
@@ -74,69 +106,18 @@ pub trait Message: Sized + 'static {
         limits: &Limits,
     ) -> Result<(), String> {
         let item = header.item();
-        item.check()?;
-        match item.is(flag::END) {
-            true => Ok(()),
-            false => header.check(bytemuck::cast_slice(payload), limits),
+        item.check(limits)?;
+        if item.is(flag::END) {
+            return Ok(());
         }
-    }
-
-    /// Returns the bytes of the payload that the header describes; what follows them in memory has
-    /// no meaning. `None`: more than a payload can have.
-    fn content_bytes(_header: &Self::Header) -> Option<usize> {
-        Some(0)
+        Self::Header::STRUCTURE.check(bytemuck::bytes_of(header), limits)?;
+        header.check_content(bytemuck::cast_slice(payload), limits)
     }
 
     fn sizes(window: &Window) -> TopicSizes {
-        window.queues(Self::HISTORY, Self::READERS)
+        window.queues(Self::HISTORY, Self::READERS.len())
     }
 }
-
-/// Implements [`Header`] for a type whose first field is `item`, and which has `check_content`.
-macro_rules! header {
-    ($header:ty, $type_name:literal) => {
-        const _: () = assert!(std::mem::offset_of!($header, item) == 0);
-
-        impl $crate::message::Header for $header {
-            const TYPE_NAME: &'static str = $type_name;
-
-            fn item(&self) -> &$crate::item::Item {
-                &self.item
-            }
-
-            fn item_mut(&mut self) -> &mut $crate::item::Item {
-                &mut self.item
-            }
-
-            fn check(&self, payload: &[u8], limits: &$crate::limits::Limits) -> Result<(), String> {
-                self.check_content(payload, limits)
-            }
-        }
-    };
-}
-pub(crate) use header;
-
-/// Defines a message without a payload.
-macro_rules! message {
-    (
-        $(#[$doc:meta])*
-        $message:ident: $topic:literal, $header:ty, $sender:expr, $readers:literal readers, $history:ident
-    ) => {
-        $(#[$doc])*
-        #[derive(Debug)]
-        pub enum $message {}
-
-        impl $crate::message::Message for $message {
-            const TOPIC: &'static str = $topic;
-            const SENDER: $crate::message::Sender = $sender;
-            const READERS: usize = $readers;
-            const HISTORY: $crate::limits::History = $crate::limits::History::$history;
-            type Header = $header;
-            type Element = $crate::message::FloatBlock;
-        }
-    };
-}
-pub(crate) use message;
 
 /// 64 bytes of a polar scan.
 #[repr(C, align(64))]
@@ -194,15 +175,21 @@ type Check = fn(&[u8], &[u8], &Limits) -> Result<(), String>;
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
     pub name: &'static str,
+    pub doc: &'static [&'static str],
     pub sender: Sender,
+    pub readers: &'static [&'static str],
+    pub uses: &'static [Use],
     pub sizes: fn(&Window) -> TopicSizes,
     pub max_elements: fn(&Limits) -> usize,
+    pub structure: &'static Structure,
     pub header: WireType,
     pub element: WireType,
     /// [`Message::check`] of the bytes of a header and of a payload.
     pub check: Check,
-    /// [`Message::content_bytes`] of the bytes of a header.
+    /// [`Header::content_bytes`] of the bytes of a header.
     pub content_bytes: fn(&[u8]) -> Option<usize>,
+    /// [`Header::words`] of the bytes of a header and of a payload.
+    pub words: fn(&[u8], &[u8]) -> String,
 }
 
 fn check<M: Message>(header: &[u8], payload: &[u8], limits: &Limits) -> Result<(), String> {
@@ -210,21 +197,26 @@ fn check<M: Message>(header: &[u8], payload: &[u8], limits: &Limits) -> Result<(
     M::check(bytemuck::from_bytes(header), payload, limits)
 }
 
-fn content_bytes<M: Message>(header: &[u8]) -> Option<usize> {
-    M::content_bytes(bytemuck::from_bytes(header))
-}
-
 impl Topic {
-    pub const fn of<M: Message>() -> Self {
+    pub(crate) const fn of<M: Message>(doc: &'static [&'static str]) -> Self {
         Self {
             name: M::TOPIC,
+            doc,
             sender: M::SENDER,
+            readers: M::READERS,
+            uses: M::USES,
             sizes: M::sizes,
-            max_elements: M::max_elements,
-            header: WireType::of::<M::Header>(M::Header::TYPE_NAME),
+            max_elements: M::Header::max_elements,
+            structure: &M::Header::STRUCTURE,
+            header: WireType::of::<M::Header>(M::Header::STRUCTURE.type_name),
             element: WireType::of::<M::Element>(M::Element::TYPE_NAME),
             check: check::<M>,
-            content_bytes: content_bytes::<M>,
+            content_bytes: |header| bytemuck::from_bytes::<M::Header>(header).content_bytes(),
+            words: |header, payload| bytemuck::from_bytes::<M::Header>(header).words(payload),
         }
+    }
+
+    pub fn is(&self, used: Use) -> bool {
+        self.uses.contains(&used)
     }
 }

@@ -1,54 +1,42 @@
 //! `pose`: the pose of the vehicle, which is also the credit that admits a new scan.
 
-use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{ComposedMotion, UncertainMotion, covariance, pose, xy_yaw};
 
 use crate::{
-    check::{covariance as check_covariance, fields, planar},
-    item::{Item, StageId},
-    limits::Limits,
-    message::{Sender, header, message},
-    motion::{MotionEstimate, MotionHeader},
+    item::Item,
+    message::Header,
+    motion::{MotionEstimate, MotionHeader, place},
+    wire::{Bounds, REACH, wire},
 };
 
-message! {
-    /// The newest pose of the trajectory. Pose `seq` is the credit that admits scan `seq + W`. The
-    /// source, masking and the supervisor read it.
-    Pose: "pose", PoseHeader, Sender::Stage(&[StageId::PoseIntegration]), 3 readers, Feedback
-}
-header!(PoseHeader, "gyre_pose_header_v11");
-
-/// A pose in the frame of the first scan: x forward, y to the left, yaw counter-clockwise, in
-/// (-pi, pi].
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct PoseHeader {
-    pub item: Item,
-    pub motion: MotionEstimate,
-    pub x_m: f64,
-    pub y_m: f64,
-    pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw) in the frame of the first scan.
-    pub covariance: covariance::Packed,
-    /// The part of it that later poses have too, equal to it where the errors of motions are
-    /// independent: see [`ComposedMotion::accumulated`].
-    pub accumulated_covariance: covariance::Packed,
-    /// Number of corrections of the whole trajectory (loop closures); always 0 while poses are only
-    /// composed motions.
-    pub trajectory_version: u64,
+wire! {
+    /// A pose in the frame of the first scan: x forward, y to the left, yaw counter-clockwise, in
+    /// (-pi, pi].
+    pub struct PoseHeader = "gyre_pose_header_v11" {
+        pub item: Item,
+        pub motion: MotionEstimate,
+        pub x_m: f64 [REACH],
+        pub y_m: f64 [REACH],
+        pub yaw_rad: f64 [Bounds::HalfTurn],
+        /// Covariance of (x, y, yaw) in the frame of the first scan.
+        pub covariance: covariance::Packed [Bounds::Covariance],
+        /// The part of it that later poses have too, equal to it where the errors of motions are
+        /// independent: see [`ComposedMotion::accumulated`].
+        pub accumulated_covariance: covariance::Packed [Bounds::Covariance],
+        /// Number of corrections of the whole trajectory (loop closures); always 0 while poses are
+        /// only composed motions.
+        pub trajectory_version: u64,
+    }
 }
 
-/// Farthest pose from the first one, m: more than a way around the earth.
-pub(crate) const MAX_DISTANCE_M: f64 = 1e8;
+impl Header for PoseHeader {
+    fn words(&self, _: &[u8]) -> String {
+        let place = place(self.x_m, self.y_m, self.yaw_rad);
+        format!("{place}{}", self.motion.standing())
+    }
+}
 
 impl PoseHeader {
-    fn check_content(&self, _: &[u8], limits: &Limits) -> Result<(), String> {
-        planar(fields![self; x_m y_m yaw_rad], MAX_DISTANCE_M)?;
-        check_covariance(&self.covariance)?;
-        check_covariance(&self.accumulated_covariance)?;
-        self.motion.check(limits)
-    }
-
     pub fn pose(&self) -> UncertainMotion {
         UncertainMotion {
             motion: pose(self.x_m, self.y_m, self.yaw_rad),

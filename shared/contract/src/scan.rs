@@ -2,96 +2,108 @@
 
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{
     MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry,
     samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample},
 };
 
 use crate::{
-    check::require,
-    item::{Item, StageId},
-    limits::{History, Limits, TopicSizes, Window},
-    message::{ByteBlock, Message, Sender, header},
+    item::Item,
+    limits::Limits,
+    message::{ByteBlock, Header},
+    wire::{Bounds, wire},
 };
 
-/// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of
-/// the payload. The samples of other sensors follow in the payload's next
-/// block: [`ScanHeader::samples`].
-#[derive(Debug)]
-pub enum Scan {}
+/// Rows without an azimuth have no meaning.
+const ROWS: Bounds = Bounds::CountedBy("azimuths");
 
-impl Message for Scan {
-    const TOPIC: &'static str = "scan";
-    const SENDER: Sender = Sender::Stage(&[StageId::RadarReplay]);
-    const READERS: usize = 1;
-    const HISTORY: History = History::Stream;
-    type Header = ScanHeader;
-    type Element = ByteBlock;
+wire! {
+    /// The geometry of a scan, and the measured angle and time of each azimuth. The power of azimuth
+    /// `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload. The samples of
+    /// other sensors follow in the payload's next block: [`ScanHeader::samples`].
+    pub struct ScanHeader = "gyre_scan_header_v7" {
+        pub item: Item,
+        pub azimuths: u32 [Bounds::Within(1.0, MAX_AZIMUTHS as f64)],
+        pub bins: u32,
+        /// Bytes from the first bin of a row to the first bin of the next row.
+        pub stride: u32,
+        pub first_byte: u32,
+        pub range_resolution_m: f32,
+        /// Offset of ranges, m: the centre of bin `b` is at
+        /// `(b + 0.5) * range_resolution_m + range_offset_m`.
+        pub range_offset_m: f32,
+        /// 1 if azimuths grow clockwise seen from above, else 0.
+        pub clockwise: u32,
+        /// Metres to add to a range for each m/s of approach; 0 if unknown: see
+        /// [`SweepGeometry::doppler_s`].
+        pub doppler_s: f32,
+        /// Number of samples of other sensors after the powers.
+        pub samples: u32 [Bounds::AtMost(|it| it.samples as f64)],
+        /// Number of samples since the scan before that were left out: late, or unusable.
+        pub samples_left_out: u32,
+        /// Time of each row, ns since 1970.
+        pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS] [ROWS],
+        /// Angle of each row from straight ahead, rad in [0, 2 pi).
+        pub azimuth_rad: [f32; MAX_AZIMUTHS] [ROWS],
+        /// Flags of each row: see `gyre_geometry::scan::flag`.
+        pub azimuth_flags: [u8; MAX_AZIMUTHS] [ROWS],
+    }
+}
+
+impl Header for ScanHeader {
+    /// Checks the geometry, the angles, the times and the samples, and that the length of the
+    /// payload fits the geometry.
+    fn check_content(&self, bytes: &[u8], _: &Limits) -> Result<(), String> {
+        let (length, azimuths) = (bytes.len(), self.azimuths as usize);
+        let scan = self.view(bytes).ok_or_else(|| {
+            format!(
+                "its payload of {length} bytes is shorter than its header states: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
+                self.bins, self.stride, self.first_byte
+            )
+        })?;
+        let checked = scan.check().and_then(|()| scan.check_times());
+        checked.map_err(|error| error.to_string())?;
+        let samples = self.samples(bytes).ok_or_else(|| {
+            let samples = self.samples;
+            format!(
+                "its payload of {length} bytes is shorter than its header states: {samples} samples"
+            )
+        })?;
+        if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {
+            let sample = samples[index];
+            return Err(format!(
+                "sample {index} is {sample:?}, but must be of a known kind, finite, and at most {MAX_RATE_RADPS} rad/s or {MAX_SPEED_MPS} m/s"
+            ));
+        }
+        match samples.is_sorted_by(|one, next| one.order() < next.order()) {
+            true => Ok(()),
+            false => Err("a sample is not later than the one before".to_owned()),
+        }
+    }
 
     fn max_elements(limits: &Limits) -> usize {
         ByteBlock::count(limits.scan_bytes) + limits.samples
     }
 
     /// Up to the last bin of the last row, or the last sample.
-    fn content_bytes(header: &Self::Header) -> Option<usize> {
-        match header.samples {
-            0 => header.power_bytes(),
-            _ => Some(header.sample_bytes()?.end),
+    fn content_bytes(&self) -> Option<usize> {
+        match self.samples {
+            0 => self.power_bytes(),
+            _ => Some(self.sample_bytes()?.end),
         }
     }
 
-    /// In live mode the history holds the scans that are published while masking restarts.
-    fn sizes(window: &Window) -> TopicSizes {
-        let sizes = window.queues(Self::HISTORY, Self::READERS);
-        if window.live_depth == 0 {
-            return sizes;
-        }
-        let depth = window.live_depth.max(sizes.history);
-        TopicSizes {
-            history: depth,
-            buffer: depth,
-            borrowed: depth + window.look_back,
-            ..sizes
-        }
-    }
-}
-header!(ScanHeader, "gyre_scan_header_v7");
-
-/// The geometry of a scan, and the measured angle and time of each azimuth.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct ScanHeader {
-    pub item: Item,
-    pub azimuths: u32,
-    pub bins: u32,
-    /// Bytes from the first bin of a row to the first bin of the next row.
-    pub stride: u32,
-    pub first_byte: u32,
-    pub range_resolution_m: f32,
-    /// Offset of ranges, m: the centre of bin `b` is at
-    /// `(b + 0.5) * range_resolution_m + range_offset_m`.
-    pub range_offset_m: f32,
-    /// 1 if azimuths grow clockwise seen from above, else 0.
-    pub clockwise: u32,
-    /// Metres to add to a range for each m/s of approach; 0 if unknown: see
-    /// [`SweepGeometry::doppler_s`].
-    pub doppler_s: f32,
-    /// Number of samples of other sensors after the powers.
-    pub samples: u32,
-    /// Number of samples since the scan before that were left out: late, or unusable.
-    pub samples_left_out: u32,
-    /// Time of each row, ns since 1970.
-    pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
-    /// Angle of each row from straight ahead, rad in [0, 2 pi).
-    pub azimuth_rad: [f32; MAX_AZIMUTHS],
-    /// Flags of each row: see `gyre_geometry::scan::flag`.
-    pub azimuth_flags: [u8; MAX_AZIMUTHS],
-}
-
-impl Default for ScanHeader {
-    fn default() -> Self {
-        Self::zeroed()
+    fn words(&self, payload: &[u8]) -> String {
+        let Some(scan) = self.view(payload) else {
+            return "its rows do not fit its header".to_owned();
+        };
+        // Four bytes are enough for a row, and are added faster than eight.
+        let row = |row| scan.row(row).iter().map(|power| u32::from(*power));
+        let rows = (0..scan.geometry.azimuths).map(|number| u64::from(row(number).sum::<u32>()));
+        let power: u64 = rows.sum();
+        let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
+        let mean = power as f64 / (azimuths * bins).max(1) as f64;
+        format!("{azimuths} azimuths of {bins} bins, mean power {mean:.2}")
     }
 }
 
@@ -119,41 +131,6 @@ impl ScanHeader {
             .checked_mul(geometry.azimuths.checked_sub(1)?)?;
         let last_row = geometry.first_byte.checked_add(rows)?;
         last_row.checked_add(geometry.bins)
-    }
-
-    /// Checks the geometry, the angles, the times and the samples, and that the length of the
-    /// payload fits the geometry.
-    fn check_content(&self, bytes: &[u8], limits: &Limits) -> Result<(), String> {
-        let (length, azimuths) = (bytes.len(), self.azimuths as usize);
-        let holds = (1..=MAX_AZIMUTHS).contains(&azimuths);
-        let expected = format_args!("1 to {MAX_AZIMUTHS}");
-        require(holds, "azimuths", azimuths, expected)?;
-        let scan = self.view(bytes).ok_or_else(|| {
-            format!(
-                "its payload of {length} bytes is shorter than its header states: {azimuths} azimuths x {} bins, {} bytes apart from byte {} on",
-                self.bins, self.stride, self.first_byte
-            )
-        })?;
-        let checked = scan.check().and_then(|()| scan.check_times());
-        checked.map_err(|error| error.to_string())?;
-        let (samples, most) = (self.samples, limits.samples);
-        let expected = format_args!("at most {most}");
-        require(samples as usize <= most, "samples", samples, expected)?;
-        let samples = self.samples(bytes).ok_or_else(|| {
-            format!(
-                "its payload of {length} bytes is shorter than its header states: {samples} samples"
-            )
-        })?;
-        if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {
-            let sample = samples[index];
-            return Err(format!(
-                "sample {index} is {sample:?}, but must be of a known kind, finite, and at most {MAX_RATE_RADPS} rad/s or {MAX_SPEED_MPS} m/s"
-            ));
-        }
-        match samples.is_sorted_by(|one, next| one.order() < next.order()) {
-            true => Ok(()),
-            false => Err("a sample is not later than the one before".to_owned()),
-        }
     }
 
     /// Returns the times of the first and of the last azimuth, ns since 1970; the stamp twice
@@ -271,6 +248,8 @@ impl ScanHeader {
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable;
+
     use super::*;
 
     #[test]
@@ -307,7 +286,7 @@ mod tests {
         assert_eq!((header.samples, header.samples_left_out), (2, 5));
         assert_eq!(header.samples(bytes), Some(&samples[..2]));
         assert_eq!(header.read_samples(bytes), Some(samples[..2].to_vec()));
-        assert_eq!(Scan::content_bytes(&header), Some(192));
+        assert_eq!(header.content_bytes(), Some(192));
         assert_eq!(header.view(bytes).map(|scan| scan.row(1)[9]), Some(7));
         header.shift_times(100, bytes);
         let stamps = header.samples(bytes).unwrap_or_default().iter();
@@ -315,6 +294,6 @@ mod tests {
         assert_eq!(header.samples(&bytes[..191]), None);
         header.set_samples(&mut [], &samples, 0);
         assert_eq!((header.samples, header.samples_left_out), (0, 3));
-        assert_eq!(Scan::content_bytes(&header), Some(45));
+        assert_eq!(header.content_bytes(), Some(45));
     }
 }

@@ -5,13 +5,14 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
-    follower::{Correction, Fix, Loop, Objects},
-    limits::{Limits, Window},
-    masked::Masked,
-    message::{Message, Sender, Topic},
-    motion::{Motion, Refined, Rotation},
-    pose::Pose,
-    scan::Scan,
+    follower::{CorrectionHeader, FixHeader, LoopHeader, ObjectsHeader},
+    item::{FollowerId, StageId},
+    limits::{History, Limits, TopicSizes, Window},
+    masked::MaskedHeader,
+    message::{ByteBlock, FloatBlock, Message, Sender, Topic, Use},
+    motion::{MotionHeader, RotationHeader},
+    pose::PoseHeader,
+    scan::ScanHeader,
 };
 
 /// Bytes that the transport puts before each sample, rounded up.
@@ -23,30 +24,145 @@ const OTHER_PAGES: usize = 32;
 const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
-const TOPICS: [Topic; 10] = [
-    Topic::of::<Scan>(),
-    Topic::of::<Masked>(),
-    Topic::of::<Rotation>(),
-    Topic::of::<Motion>(),
-    Topic::of::<Refined>(),
-    Topic::of::<Pose>(),
-    Topic::of::<Loop>(),
-    Topic::of::<Correction>(),
-    Topic::of::<Fix>(),
-    Topic::of::<Objects>(),
-];
+/// Defines the messages, in the order of the stream.
+macro_rules! topics {
+    ($(
+        $(#[doc = $doc:literal])+
+        $Message:ident = $topic:literal {
+            $Header:ty, $Element:ty, by $sender:expr, for $readers:expr, $history:ident,
+            is [$($used:ident)*]
+            $(, sizes: $sizes:expr)?
+        }
+    )*) => {
+        $(
+            $(#[doc = $doc])+
+            #[derive(Debug)]
+            pub enum $Message {}
+
+            const _: () = assert!(std::mem::offset_of!($Header, item) == 0);
+
+            impl Message for $Message {
+                const TOPIC: &'static str = $topic;
+                const SENDER: Sender = $sender;
+                const READERS: &'static [&'static str] = &$readers;
+                const HISTORY: History = History::$history;
+                const USES: &'static [Use] = &[$(Use::$used),*];
+                type Header = $Header;
+                type Element = $Element;
+                const ENTRY: &'static Topic = &Topic::of::<Self>(&[$($doc),+]);
+
+                $(fn sizes(window: &Window) -> TopicSizes {
+                    let sizes: fn(&Window, TopicSizes) -> TopicSizes = $sizes;
+                    sizes(window, window.queues(Self::HISTORY, Self::READERS.len()))
+                })?
+            }
+        )*
+
+        /// All topics, in the order of the stream.
+        const TOPICS: &[&Topic] = &[$($Message::ENTRY),*];
+    };
+}
+
+topics! {
+    /// A polar scan as measured, with samples of gyro and wheels. Payload: the image as decoded,
+    /// then the samples.
+    Scan = "scan" {
+        ScanHeader, ByteBlock, by Sender::Stage(&[StageId::RadarReplay]), for ["masking"], Stream,
+        is [Recorded Large],
+        // In live mode the history holds the scans that are published while masking restarts.
+        sizes: |window, sizes| {
+            let depth = window.live_depth.max(sizes.history);
+            let borrowed = depth + window.look_back;
+            match window.live_depth {
+                0 => sizes,
+                _ => TopicSizes { history: depth, buffer: depth, borrowed, ..sizes },
+            }
+        }
+    }
+    /// Masked rasters and sparse points, and what gyro, wheels and Doppler have measured. Payload:
+    /// one raster if the mask takes one scan, or two (this scan and the previous one, both masked
+    /// for this pair) if it takes both; then the scan's points. Each part starts at a whole block.
+    Masked = "masked" {
+        MaskedHeader, FloatBlock, by Sender::Stage(&[StageId::Masking]),
+        for ["rotation-search", "translation-search", "refinement"], Stream,
+        is [Large],
+        // In a run with SLAM pose-integration reads the points of keyframes.
+        sizes: |window, sizes| TopicSizes {
+            readers: sizes.readers + usize::from(window.logs_points()),
+            ..sizes
+        }
+    }
+    /// The rotation from the previous scan to this one.
+    Rotation = "rotation" {
+        RotationHeader, FloatBlock, by Sender::Stage(&[StageId::RotationSearch]),
+        for ["translation-search"], Stream, is []
+    }
+    /// The motion from the previous scan to this one.
+    Motion = "motion" {
+        MotionHeader, FloatBlock,
+        by Sender::Stage(&[StageId::TranslationSearch, StageId::JointSearch]),
+        for ["refinement or pose-integration", "masking"], Feedback,
+        is [Recorded Linked]
+    }
+    /// As `motion`, in runs with refinement. The searched motion stays beside the refined one.
+    Refined = "refined" {
+        MotionHeader, FloatBlock, by Sender::Stage(&[StageId::Refinement]),
+        for ["pose-integration"], Feedback, is [Recorded Linked]
+    }
+    /// The newest pose of the trajectory. Pose `seq` is the credit that admits scan `seq + W`.
+    Pose = "pose" {
+        PoseHeader, FloatBlock, by Sender::Stage(&[StageId::PoseIntegration]),
+        for ["radar-replay", "masking", "supervisor"], Feedback,
+        is [Recorded Linked]
+    }
+    /// An accepted loop between two keyframes.
+    Loop = "loop" {
+        LoopHeader, FloatBlock, by Sender::Follower(FollowerId::LoopClosure), for [], Latest,
+        is [Recorded Linked]
+    }
+    /// The transform that corrects poses of the odometry. Odometry is continuous and drifts; the
+    /// correction jumps when a loop is closed (REP-105: the transform from `map` to `odom`).
+    Correction = "correction" {
+        CorrectionHeader, FloatBlock, by Sender::Follower(FollowerId::Trajectory), for [], Latest,
+        is [Recorded Linked Replaces]
+    }
+    /// The place of a keyframe in the map of an earlier drive.
+    Fix = "fix" {
+        FixHeader, FloatBlock, by Sender::Follower(FollowerId::Localisation), for [], Latest,
+        is [Recorded Linked]
+    }
+    /// Moving objects.
+    Objects = "objects" {
+        ObjectsHeader, FloatBlock, by Sender::Follower(FollowerId::Objects), for [], Latest,
+        is [Recorded]
+    }
+}
+
+/// Returns all topics, in the order of the stream.
+pub fn all() -> impl Iterator<Item = &'static Topic> {
+    TOPICS.iter().copied()
+}
 
 /// Returns the topics of a run, in the order of the stream.
 pub fn topics(window: &Window) -> impl Iterator<Item = &'static Topic> + use<> {
     let window = *window;
-    TOPICS.iter().filter(move |topic| match topic.sender {
-        Sender::Stage(_) => true,
-        Sender::Follower(follower) => follower.is_in(&window),
-    })
+    TOPICS
+        .iter()
+        .copied()
+        .filter(move |topic| match topic.sender {
+            Sender::Stage(_) => true,
+            Sender::Follower(follower) => follower.is_in(&window),
+        })
 }
 
 pub fn topic(name: &str) -> Option<&'static Topic> {
-    TOPICS.iter().find(|topic| topic.name == name)
+    all().find(|topic| topic.name == name)
+}
+
+/// Returns the topic of this name, or a sentence that names those that there are.
+pub fn named(name: &str) -> Result<&'static Topic, String> {
+    let known = || all().map(|topic| topic.name).collect::<Vec<_>>().join(", ");
+    topic(name).ok_or_else(|| format!("there is no topic `{name}`: there are {}", known()))
 }
 
 /// Returns an upper limit of the transport's bookkeeping, with whole pages for each file: a service

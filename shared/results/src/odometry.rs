@@ -32,21 +32,8 @@ pub fn write_row(pose: &PoseHeader, text: &mut String) {
     add(text, &[rotation.runner_up_score], 9);
     add(text, &motion.searched, 9);
     let refinement = &motion.refinement;
-    let outcome = match refinement.outcome {
-        outcome::SEARCHED => "searched",
-        outcome::REFINED => "refined",
-        outcome::WEAK => "weak",
-        outcome::PREDICTED => "predicted",
-        _ => "unknown",
-    };
-    let guess = match refinement.initial_guess {
-        initial_guess::NONE => "none",
-        initial_guess::PREDICTION => "prediction",
-        initial_guess::SEARCH => "search",
-        initial_guess::YAW_OFFSET => "yaw-offset",
-        initial_guess::ALONG_WALLS => "along-walls",
-        _ => "unknown",
-    };
+    let outcome = outcome::name(refinement.outcome);
+    let guess = initial_guess::name(refinement.initial_guess);
     let _ = write!(text, ",{outcome},{guess}");
     add(text, &[refinement.overlap, refinement.support], 9);
     let _ = write!(text, ",{}", u8::from(refinement.is_stationary()));

@@ -20,7 +20,7 @@ use gyre_client::{
     wake::{MAX_WAIT, Signals},
 };
 use gyre_contract::{
-    Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Window, run::LinkConfig, topic,
+    Limits, Loop, Message as _, Pose, Use, Window, composed, run::LinkConfig, topic, topic_named,
 };
 use gyre_journal::{self as journal, loops::LoggedLoops};
 use serde::{Deserialize, Serialize};
@@ -35,8 +35,6 @@ use crate::{
 };
 
 const NAME: &str = "link";
-/// The topics that are sent unless others are named, of those that the run has.
-const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
 /// Bytes that are kept of a topic without payloads: hours.
 const MAX_BYTES: usize = 64 << 20;
 /// Time for a receiver to reconnect if its sender was restarted just before the end.
@@ -150,7 +148,7 @@ impl<'run> Sending<'run> {
         let poses = Arc::new(LogBuffer::of_poses(&manifest.out));
         let names = topics(named, manifest)?;
         let topics = names.iter().copied().map(|name| {
-            let observer = run.observe_topic(name)?.ok_or_else(|| no_topic(name))?;
+            let observer = run.observe_topic(topic_named(name).map_err(RunError::Input)?)?;
             let buffer = buffer(name, manifest, &poses)?;
             Ok(SentTopic {
                 observer,
@@ -235,10 +233,7 @@ fn buffer(
     manifest: &Manifest,
     poses: &Arc<LogBuffer>,
 ) -> Result<Arc<dyn ReplayBuffer>, RunError> {
-    let composed = match manifest.refines {
-        true => Refined::TOPIC,
-        false => Motion::TOPIC,
-    };
+    let composed = composed(manifest.refines).name;
     let buffer: Arc<dyn ReplayBuffer> = match name {
         Pose::TOPIC => poses.clone(),
         Loop::TOPIC => {
@@ -254,32 +249,26 @@ fn buffer(
 
 /// Returns whether no message of a topic may be missed: all but the large ones with payloads.
 pub(crate) fn is_lossless(topic: &str) -> bool {
-    topic != Scan::TOPIC && topic != Masked::TOPIC
+    !gyre_contract::topic(topic).is_some_and(|it| it.is(Use::Large))
 }
 
 /// Returns the topics to send; poses are among them, since the motions come with them.
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, RunError> {
     let named: Vec<&str> = match named.is_empty() {
-        true => DEFAULT
-            .into_iter()
-            .filter(|name| manifest.has_topic(name))
+        true => gyre_contract::all()
+            .filter(|topic| topic.is(Use::Linked) && manifest.has_topic(topic.name))
+            .map(|topic| topic.name)
             .collect(),
         false => named.iter().map(String::as_str).collect(),
     };
     let mut topics = Vec::new();
     for name in named.into_iter().chain([Pose::TOPIC]) {
-        let name = topic(name).ok_or_else(|| no_topic(name))?.name;
+        let name = topic_named(name).map_err(RunError::Input)?.name;
         if !topics.contains(&name) {
             topics.push(name);
         }
     }
     Ok(topics)
-}
-
-fn no_topic(name: &str) -> RunError {
-    RunError::Input(format!(
-        "there is no topic `{name}`: there are scan, masked, rotation, motion, refined, pose, loop, correction and fix"
-    ))
 }
 
 fn offer(

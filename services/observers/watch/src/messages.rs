@@ -121,12 +121,7 @@ pub fn pose(pose: &PoseHeader) -> Value {
         "speed_mps": per_s(motion.x_m.hypot(motion.y_m)),
         "yaw_rate_radps": per_s(motion.yaw_rad),
         "stationary": record.is_stationary(),
-        "outcome": match record.outcome {
-            outcome::REFINED => "refined",
-            outcome::WEAK => "weak",
-            outcome::PREDICTED => "predicted",
-            _ => "searched",
-        },
+        "outcome": outcome::name(record.outcome),
         // Mean of the map under the scan's points, 0 to 1.
         "overlap": record.overlap,
         "basis": record.basis().name(),

@@ -11,7 +11,7 @@ use gyre_supervise::{
     rig::{Process, Recorded, Rig, Tap},
 };
 
-use crate::conformance::topics::StageTopics;
+use gyre_contract::StageTopics;
 
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -25,7 +25,7 @@ pub struct Candidate {
 
 impl Candidate {
     pub(crate) fn topics(&self) -> StageTopics {
-        StageTopics::of(self.stage, &self.manifest)
+        StageTopics::of(self.stage, &self.manifest.window, self.manifest.refines)
     }
 
     /// Creates a run that writes to `out`, without its services.
@@ -69,7 +69,11 @@ impl<'a> Harness<'a> {
     /// Creates the services of the run, and opens the topics of the stage.
     pub(crate) fn open(mut rig: Rig<'a>, candidate: &'a Candidate) -> Result<Self, RunError> {
         rig.create_services()?;
-        let topics = StageTopics::of(candidate.stage, rig.manifest());
+        let topics = StageTopics::of(
+            candidate.stage,
+            &rig.manifest().window,
+            rig.manifest().refines,
+        );
         let mut harness = Self {
             process: None,
             feeds: BTreeMap::new(),

@@ -8,12 +8,13 @@ use std::{
 
 use gyre_client::{RunError, TopicWriter, wake::Signals};
 use gyre_configuration::terminal::{Failure, own};
+use gyre_contract::StageTopics;
 use gyre_contract::{
     Item, Message, Motion, Pose, PoseHeader, StageId, compose, flag, run::StageConfig,
 };
 use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
 
-use crate::conformance::{Test, harness::start_of_trajectory, topics::StageTopics};
+use crate::conformance::{Test, harness::start_of_trajectory};
 
 /// Time between two polls of what does not wake the tester.
 pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(2);
@@ -84,7 +85,7 @@ impl<'a> OwnPipeline<'a> {
         stages.retain(|it| *it != StageId::PoseIntegration);
         let mut taps = Vec::new();
         for stage in &stages {
-            let topic = StageTopics::of(*stage, manifest).output;
+            let topic = StageTopics::of(*stage, &manifest.window, manifest.refines).output;
             taps.push((topic, rig.tap(topic)?));
         }
         let poses = rig.feed(Pose::TOPIC)?;

@@ -82,10 +82,8 @@ fn piece() -> Vec<u8> {
 /// Copies the messages of all topics of a run until it ends.
 pub(super) fn observe(out: &Path) -> Result<(), Failure> {
     let (run, signals) = (ObservedRun::writing_to(out)?, Signals::install()?);
-    let mut observers = Vec::new();
-    for topic in topics(&run.manifest().window) {
-        observers.extend(run.observe_topic(topic.name)?);
-    }
+    let observers = topics(&run.manifest().window).map(|topic| run.observe_topic(topic));
+    let mut observers = observers.collect::<Result<Vec<_>, _>>()?;
     print::line(READY)?;
     while !observers.iter().all(|it| it.has_ended()) {
         let listeners: Vec<_> = observers.iter().map(|it| it.listener()).collect();

@@ -111,7 +111,7 @@ fn observers_leave_the_places_of_the_stages_free() {
         .collect();
     let one_too_many = observed.try_attach::<Pose>(Pose::ENTRY).map(drop);
     assert!(matches!(one_too_many, Err(RunError::NoPlace { .. })));
-    let readers: Vec<_> = (0..Pose::READERS)
+    let readers: Vec<_> = (0..Pose::READERS.len())
         .map(|_| reader::<Pose>(&run.manifest, None))
         .collect();
     // An observer that leaves makes room at once.

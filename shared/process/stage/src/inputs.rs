@@ -10,7 +10,7 @@ use gyre_transport::{
     transport::Listener,
 };
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action {
     /// Wait: an input is missing.
     Wait,

@@ -3,7 +3,7 @@
 use std::fs;
 
 use gyre_contract::{
-    Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, StageId, flag,
+    Item, Masked, Message, Motion, MotionHeader, Pose, PoseHeader, StageId, flag,
     run::StageCounters,
 };
 use gyre_transport::{
@@ -49,10 +49,7 @@ pub fn run<S: Sink>(launch: &Launch, sink: &mut S) -> Result<StageCounters, RunE
     let last = restored.last().map(|pose| pose.item);
     let next = last.map_or(0, |last| last.seq.saturating_add(1));
     // Both have the same header.
-    let topic = match launch.manifest.refines {
-        true => Refined::ENTRY,
-        false => Motion::ENTRY,
-    };
+    let topic = gyre_contract::composed(launch.manifest.refines);
     if ended {
         poses.end(last.unwrap_or_default(), Some(S::HOP))?;
     }

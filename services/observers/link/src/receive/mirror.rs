@@ -5,7 +5,7 @@ use gyre_client::{
     observer::Sequence,
     wake::{MAX_WAIT, Signals},
 };
-use gyre_contract::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
+use gyre_contract::{Limits, Message as _, Pose, PoseHeader, Use, flag, topic};
 use gyre_journal::Journal;
 use gyre_supervise::rig::Rig;
 use zenoh::{Session, qos::Priority};
@@ -170,11 +170,10 @@ impl Mirror<'_> {
 
     fn received(&self, is_interrupted: bool) -> Received {
         let counts = self.topics.iter().map(|topic| {
-            let missed = match topic.name {
-                // The numbers of corrections count the poses in them, and each replaces those
-                // before.
-                Correction::TOPIC => 0,
-                _ => topic.sequence.missed,
+            let replaces = gyre_contract::topic(topic.name).is_some_and(|it| it.is(Use::Replaces));
+            let missed = match replaces {
+                true => 0,
+                false => topic.sequence.missed,
             };
             let received = topic.received;
             (topic.name.to_owned(), ReceivedCount { received, missed })

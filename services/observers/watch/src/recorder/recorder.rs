@@ -14,7 +14,7 @@ use gyre_client::{
     run,
     wake::{MAX_WAIT, Signals},
 };
-use gyre_contract::{Message, Pose, topic};
+use gyre_contract::{Message, Pose, Use, topic, topic_named};
 use gyre_recording::{LogTail, SplitWriter};
 
 use crate::recorder::{
@@ -27,16 +27,6 @@ use crate::recorder::{
 };
 
 const NAME: &str = "recorder";
-const DEFAULT: [&str; 8] = [
-    "scan",
-    "motion",
-    "refined",
-    "pose",
-    "loop",
-    "correction",
-    "fix",
-    "objects",
-];
 const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,11 +73,13 @@ pub fn record(options: &Options) -> Result<Recorded, RunError> {
     let topics = topics(&options.topics, manifest)?;
     let begun = begin(options, manifest, &topics)?;
     let mut taps = Vec::new();
-    for topic in &topics {
+    for name in &topics {
         // Recording begins with the first scan, which waits for the recorder.
         let expected = begun.earlier.as_ref();
-        let expected = expected.map(|it| it.get(topic).copied().unwrap_or_default());
-        taps.extend(Tap::on(&run, topic, expected)?);
+        let expected = expected.map(|it| it.get(name).copied().unwrap_or_default());
+        if let Some(topic) = topic(name) {
+            taps.push(Tap::on(&run, topic, expected)?);
+        }
     }
     let (to, split) = (options.to.clone(), options.split);
     let earlier = begun.earlier.unwrap_or_default();
@@ -129,17 +121,15 @@ pub fn record(options: &Options) -> Result<Recorded, RunError> {
 
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RunError> {
     if named.is_empty() {
-        let topics = DEFAULT.into_iter().filter(|name| manifest.has_topic(name));
-        let topics = topics.chain([LOG, HEALTH]);
-        return Ok(topics.map(str::to_owned).collect());
+        let topics = gyre_contract::all().filter(|it| it.is(Use::Recorded));
+        let topics = topics.map(|it| it.name).filter(|it| manifest.has_topic(it));
+        return Ok(topics.chain([LOG, HEALTH]).map(str::to_owned).collect());
     }
-    let is_other = |name: &&String| *name != LOG && *name != HEALTH && topic(name).is_none();
-    match named.iter().find(is_other) {
-        Some(unknown) => Err(RunError::Input(format!(
-            "there is no topic `{unknown}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix, log and health"
-        ))),
-        None => Ok(named.to_vec()),
+    for name in named.iter().filter(|it| *it != LOG && *it != HEALTH) {
+        let unknown = |sentence| RunError::Input(format!("{sentence}, {LOG}, {HEALTH}"));
+        topic_named(name).map_err(unknown)?;
     }
+    Ok(named.to_vec())
 }
 
 struct Recorder<'run> {

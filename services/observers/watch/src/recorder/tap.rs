@@ -4,7 +4,7 @@ use gyre_client::{
     Listener, RecordedMessage, RunError, clock,
     observer::{ObservedRun, TopicObserver},
 };
-use gyre_contract::{Correction, Message};
+use gyre_contract::{Topic, Use};
 use gyre_recording::{Incoming, Position};
 
 use crate::recorder::queue::{Entry, Sender};
@@ -19,6 +19,7 @@ pub struct Counts {
 }
 
 pub(crate) struct Tap<'run> {
+    topic: &'static Topic,
     observer: TopicObserver<'run>,
     recorded: u64,
     dropped: u64,
@@ -27,35 +28,32 @@ pub(crate) struct Tap<'run> {
 }
 
 impl<'run> Tap<'run> {
-    /// Observes a topic by its name; `None` if there is no such topic. Messages from the position
-    /// `expected` on are to be recorded, if it is known: those before are in earlier parts.
+    /// Observes a topic. Messages from the position `expected` on are to be recorded, if it is
+    /// known: those before are in earlier parts.
     pub(crate) fn on(
         run: &'run ObservedRun,
-        topic: &str,
+        topic: &'static Topic,
         expected: Option<Position>,
-    ) -> Result<Option<Self>, RunError> {
-        let Some(mut observer) = run.observe_topic(topic)? else {
-            return Ok(None);
-        };
+    ) -> Result<Self, RunError> {
+        let mut observer = run.observe_topic(topic)?;
         if let Some(Position { next, generation }) = expected {
             observer.expect(next, generation);
         }
         let generation = expected.unwrap_or_default().generation;
-        Ok(Some(Self {
+        Ok(Self {
+            topic,
             observer,
             recorded: 0,
             dropped: 0,
             reported: 0,
             generation,
-        }))
+        })
     }
 
     fn missed(&self) -> u64 {
-        // The numbers of corrections count their keyframes, and each correction replaces those
-        // before.
-        let overwritten = match self.observer.topic() {
-            Correction::TOPIC => 0,
-            _ => self.observer.missed(),
+        let overwritten = match self.topic.is(Use::Replaces) {
+            true => 0,
+            false => self.observer.missed(),
         };
         overwritten + self.dropped
     }

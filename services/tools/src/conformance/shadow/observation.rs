@@ -9,7 +9,7 @@ use gyre_client::{
 use gyre_contract::{StageId, flag};
 use gyre_supervise::rig::Recorded;
 
-use crate::conformance::topics::StageTopics;
+use gyre_contract::StageTopics;
 
 /// Items that are not complete. Beyond them the oldest is given up: in live mode most scans never
 /// become an item.
@@ -74,7 +74,11 @@ impl<'run> Observation<'run> {
         }
         let mut observers = Vec::new();
         for topic in &topics {
-            observers.extend(run.observe_topic(topic)?);
+            observers.extend(
+                gyre_contract::topic(topic)
+                    .map(|it| run.observe_topic(it))
+                    .transpose()?,
+            );
         }
         Ok(Self {
             run,

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use gyre_contract::{
-    Correction, Element, Fix, Header, Item, Loop, Masked, Message, Motion, Objects, Pose,
-    PoseHeader, Refined, Rotation, Scan,
+    Correction, Fix, Header, Item, Loop, Masked, Message, Motion, Objects, Pose, PoseHeader,
+    Refined, Rotation, Scan,
 };
 use iceoryx2::{
     port::update_connections::UpdateConnections,
@@ -18,14 +18,14 @@ type Typed<M> = PortFactory<ipc::Service, [TypedElement<M>], TypedHeader<M>>;
 
 /// Defines a type of the bytes of a message, as another language has it.
 macro_rules! typed {
-    ($typed:ident, $bytes:ident) => {
+    ($typed:ident, $bytes:ident, $wire:ident) => {
         #[repr(transparent)]
         struct $typed<M: Message>(M::$bytes);
 
         // SAFETY: plain data.
         unsafe impl<M: Message> ZeroCopySend for $typed<M> {
             unsafe fn type_name() -> &'static str {
-                M::$bytes::TYPE_NAME
+                M::ENTRY.$wire.name
             }
         }
 
@@ -37,8 +37,8 @@ macro_rules! typed {
     };
 }
 
-typed!(TypedHeader, Header);
-typed!(TypedElement, Element);
+typed!(TypedHeader, Header, header);
+typed!(TypedElement, Element, element);
 
 impl<M: Message> Default for TypedHeader<M> {
     fn default() -> Self {
@@ -89,7 +89,7 @@ fn gyre_receives_what_a_typed_publisher_sends() {
     let run = Run::begin();
     let mut masked = reader::<Masked>(&run.manifest, None);
     let limits = &run.manifest.limits;
-    let elements = Masked::max_elements(limits);
+    let elements = (Masked::ENTRY.max_elements)(limits);
     let typed = open::<Masked>(&run);
     let publisher = typed.publisher_builder().initial_max_slice_len(elements);
     let publisher = publisher.create().unwrap();

@@ -1,10 +1,12 @@
 //! The topics of each stage.
 
-use gyre_client::Manifest;
-use gyre_contract::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId};
+use crate::{
+    Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Topic, limits::Window,
+};
 
+/// The topics that a stage reads and sends.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct StageTopics {
+pub struct StageTopics {
     /// The inputs that lead down the stream: item `seq` is sent for the stage to answer with its
     /// item `seq`. The last one comes from farthest down the stream.
     pub forward: Vec<&'static str>,
@@ -14,15 +16,20 @@ pub(crate) struct StageTopics {
     pub output: &'static str,
 }
 
+/// Returns the topic whose motions are composed to poses, in a run with refinement or without.
+pub fn composed(refines: bool) -> &'static Topic {
+    match refines {
+        true => Refined::ENTRY,
+        false => Motion::ENTRY,
+    }
+}
+
 impl StageTopics {
-    pub(crate) fn of(stage: StageId, manifest: &Manifest) -> Self {
+    pub fn of(stage: StageId, window: &Window, refines: bool) -> Self {
         const SCAN: &str = Scan::TOPIC;
         const MASKED: &str = Masked::TOPIC;
         const MOTION: &str = Motion::TOPIC;
-        let motions = match manifest.refines {
-            true => Refined::TOPIC,
-            false => MOTION,
-        };
+        let motions = composed(refines).name;
         let mut feedback = Vec::new();
         let (forward, output) = match stage {
             StageId::RadarReplay => {
@@ -37,9 +44,7 @@ impl StageTopics {
             StageId::TranslationSearch => (vec![MASKED, Rotation::TOPIC], MOTION),
             StageId::JointSearch => (vec![MASKED], MOTION),
             StageId::Refinement => (vec![MASKED, MOTION], Refined::TOPIC),
-            StageId::PoseIntegration if manifest.window.slam => {
-                (vec![MASKED, motions], Pose::TOPIC)
-            }
+            StageId::PoseIntegration if window.slam => (vec![MASKED, motions], Pose::TOPIC),
             StageId::PoseIntegration => (vec![motions], Pose::TOPIC),
         };
         Self {
@@ -49,12 +54,12 @@ impl StageTopics {
         }
     }
 
-    pub(crate) fn inputs(&self) -> impl Iterator<Item = &'static str> {
+    pub fn inputs(&self) -> impl Iterator<Item = &'static str> {
         self.forward.iter().chain(&self.feedback).copied()
     }
 
     /// Returns the topic whose items the stage copies; `None` for a source.
-    pub(crate) fn copied(&self) -> Option<&'static str> {
+    pub fn copied(&self) -> Option<&'static str> {
         self.forward.last().copied()
     }
 }
