@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_messages::{Message, Pose, topic};
-use gyre_recording::{LogTail, SplitWriter};
+use gyre_recording::{LogTail, Positions, SplitWriter};
 use gyre_stage::{
     Manifest, StageError, clock, launch,
     observer::{ObservedRun, wait_for_any},
@@ -82,13 +82,7 @@ pub fn record(options: &Options) -> Result<Recorded, StageError> {
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
     let begun = begin(options, manifest, &topics)?;
-    let mut taps = Vec::new();
-    for topic in &topics {
-        // Recording begins with the first scan, which waits for the recorder.
-        let expected = begun.earlier.as_ref();
-        let expected = expected.map(|it| it.get(topic).copied().unwrap_or_default());
-        taps.extend(Tap::on(&run, topic, expected)?);
-    }
+    let taps = taps(&run, &topics, begun.earlier.as_ref())?;
     let (to, split) = (options.to.clone(), options.split);
     let earlier = begun.earlier.unwrap_or_default();
     let writer = SplitWriter::create(to, begun.head, split, begun.ledger, earlier);
@@ -141,6 +135,19 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, StageErr
         ))),
         None => Ok(named.to_vec()),
     }
+}
+
+fn taps<'run>(
+    run: &'run ObservedRun,
+    topics: &[String],
+    earlier: Option<&Positions>,
+) -> Result<Vec<Tap<'run>>, StageError> {
+    let tap = |topic: &String| {
+        // Recording begins with the first scan, which waits for the recorder.
+        let expected = earlier.map(|it| it.get(topic).copied().unwrap_or_default());
+        Tap::on(run, topic, expected).transpose()
+    };
+    topics.iter().filter_map(tap).collect()
 }
 
 struct Recorder<'run> {
