@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_is_finite_and_within_its_bounds() {
+    fn motions_and_places_are_finite_and_within_their_bounds() {
         refused! { Rotation, RotationHeader::default(), &[];
             "flags is 16": |it| it.item.flags = 16,
             "previous_scan is 3": |it| it.item.previous_scan = 3,
@@ -158,20 +158,6 @@ mod tests {
             "covariance": |it| it.covariance[0] = -1.0,
             "x_m is inf": |it| it.motion.x_m = f64::INFINITY,
         }
-        let header = LoopHeader {
-            later_seq: 9,
-            earlier_seq: 2,
-            loops: 1,
-            ..LoopHeader::default()
-        };
-        refused! { Loop, header, &[];
-            "earlier_seq is 9": |it| it.earlier_seq = 9,
-            "x_m is 6.5": |it| it.x_m = 6.5,
-            "yaw_rad is NaN": |it| it.yaw_rad = f64::NAN,
-            "covariance": |it| it.covariance[0] = -1.0,
-            "correlation is 1.5": |it| it.correlation = 1.5,
-            "loops is 0": |it| it.loops = 0,
-        }
         let header = CorrectionHeader {
             keyframes: 1,
             ..CorrectionHeader::default()
@@ -188,6 +174,24 @@ mod tests {
             "covariance": |it| it.covariance[0] = -1.0,
             "correlation is NaN": |it| it.correlation = f64::NAN,
             "status is 4": |it| it.status = 4,
+        }
+    }
+
+    #[test]
+    fn loops_and_objects_are_finite_and_within_their_bounds() {
+        let header = LoopHeader {
+            later_seq: 9,
+            earlier_seq: 2,
+            loops: 1,
+            ..LoopHeader::default()
+        };
+        refused! { Loop, header, &[];
+            "earlier_seq is 9": |it| it.earlier_seq = 9,
+            "x_m is 6.5": |it| it.x_m = 6.5,
+            "yaw_rad is NaN": |it| it.yaw_rad = f64::NAN,
+            "covariance": |it| it.covariance[0] = -1.0,
+            "correlation is 1.5": |it| it.correlation = 1.5,
+            "loops is 0": |it| it.loops = 0,
         }
         let car = ListedObject {
             x_m: 20.0,

@@ -130,31 +130,7 @@ impl MaskedHeader {
         let [vx, vy, yaw_rate] = self.twist.map(f64::from);
         finite([("twist[0]", vx), ("twist[1]", vy), ("twist[2]", yaw_rate)])?;
         not_negative([("azimuth_variance_rad2", self.azimuth_variance_rad2.into())])?;
-        code("has_gyro", self.has_gyro, 1_u64)?;
-        code("has_wheels", self.has_wheels, 1_u64)?;
-        code("has_doppler", self.has_doppler, 1_u64)?;
-        let (gyro, wheels) = (&self.gyro, &self.wheels);
-        of("gyro.", finite(fields![gyro; yaw_rad sweep_rate_radps]))?;
-        of(
-            "gyro.",
-            not_negative(fields![gyro; variance_rad2 interval_s]),
-        )?;
-        of("wheels.", finite(fields![wheels; distance_m]))?;
-        let spread = fields![wheels; variance_m2 side_variance_m2 interval_s];
-        of("wheels.", not_negative(spread))?;
-        let ([vx, vy], [xx, xy, yy]) = (self.doppler.velocity_mps, self.doppler.covariance);
-        of(
-            "doppler.",
-            finite([
-                ("velocity_mps[0]", vx),
-                ("velocity_mps[1]", vy),
-                ("covariance[1]", xy),
-            ]),
-        )?;
-        of(
-            "doppler.",
-            not_negative([("covariance[0]", xx), ("covariance[2]", yy)]),
-        )?;
+        self.check_measured()?;
         let points = self.points(values).ok_or_else(|| {
             let bytes = payload.len();
             format!("its payload of {bytes} bytes is shorter than its header states: {rasters} rasters of {n} x {n} cells and {points} points")
@@ -168,6 +144,26 @@ impl MaskedHeader {
                 points[index]
             )),
         }
+    }
+
+    /// Checks the turn, the distance and the velocity.
+    fn check_measured(&self) -> Result<(), String> {
+        code("has_gyro", self.has_gyro, 1_u64)?;
+        code("has_wheels", self.has_wheels, 1_u64)?;
+        code("has_doppler", self.has_doppler, 1_u64)?;
+        let (gyro, wheels) = (&self.gyro, &self.wheels);
+        of("gyro.", finite(fields![gyro; yaw_rad sweep_rate_radps]))?;
+        let spread = fields![gyro; variance_rad2 interval_s];
+        of("gyro.", not_negative(spread))?;
+        of("wheels.", finite(fields![wheels; distance_m]))?;
+        let spread = fields![wheels; variance_m2 side_variance_m2 interval_s];
+        of("wheels.", not_negative(spread))?;
+        let ([vx, vy], [xx, xy, yy]) = (self.doppler.velocity_mps, self.doppler.covariance);
+        let velocity = [("velocity_mps[0]", vx), ("velocity_mps[1]", vy)];
+        of("doppler.", finite(velocity))?;
+        of("doppler.", finite([("covariance[1]", xy)]))?;
+        let spread = [("covariance[0]", xx), ("covariance[2]", yy)];
+        of("doppler.", not_negative(spread))
     }
 
     /// Returns the number of values of one raster, rounded up to whole blocks.
