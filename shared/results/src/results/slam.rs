@@ -15,7 +15,7 @@ use gyre_slam::{
     Correction, Fixes, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader,
     TrajectoryEstimator, records_path,
 };
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, print};
 
 use crate::{
     out::Out,
@@ -153,7 +153,11 @@ impl Slam {
             return Ok(None);
         };
         self.estimator.scale_covariances()?;
-        Ok(Some(GnssSummary::of(log, &mut self.estimator)?))
+        let gnss = GnssSummary::of(log, &mut self.estimator)?;
+        if let Some((refusal, false)) = gnss.refusal() {
+            print::note(format_args!("the fixes of GNSS are not used: {refusal}"));
+        }
+        Ok(Some(gnss))
     }
 
     /// Returns the errors of the corrected keyframes with their standard deviations, relative to
