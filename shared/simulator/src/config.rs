@@ -86,14 +86,8 @@ impl Default for SimulationConfig {
 
 impl SimulationConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        let Self {
-            drive,
-            sensor,
-            gyro,
-            wheels,
-            gnss,
-            ..
-        } = self;
+        let (drive, sensor) = (&self.drive, &self.sensor);
+        let (gyro, wheels, gnss) = (&self.gyro, &self.wheels, &self.gnss);
         let scans = self.scans.unwrap_or(1) as f64;
         let [blind_s, sees_s] = self.blind_s.unwrap_or_default();
         let [begins_m, length_m] = self.tunnel_m.unwrap_or([0.0, 10.0]);
