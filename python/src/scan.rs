@@ -188,12 +188,50 @@ fn power<'py>(bytes: &Bound<'py, PyAny>, geometry: &SweepGeometry) -> PyResult<B
     array.call((shape, dtype), Some(&keywords))
 }
 
+/// Returns the layout of powers that can be read in place.
+fn layout(power: &Bound<'_, PyAny>) -> PyResult<SweepGeometry> {
+    let array = given::<u8, Ix2>(power, "power", POWER)?;
+    if !array.is_c_contiguous() {
+        return Err(PyValueError::new_err(
+            "power is not C-contiguous, and is not copied silently: pass np.ascontiguousarray(power)",
+        ));
+    }
+    let [azimuths, bins] = [array.shape()[0], array.shape()[1]];
+    if azimuths == 0 || bins == 0 {
+        return Err(errors::scan(format!(
+            "power has shape ({azimuths}, {bins}), but a scan has azimuths and range bins"
+        )));
+    }
+    Ok(SweepGeometry {
+        azimuths,
+        bins,
+        stride: bins,
+        ..SweepGeometry::default()
+    })
+}
+
+fn stamps<'py>(
+    py: Python<'py>,
+    geometry: &SweepGeometry,
+    given: Option<&Bound<'py, PyAny>>,
+    sweep_s: Option<f64>,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    match (given, sweep_s) {
+        (Some(stamps), None) => converted(stamps, "azimuth_stamp_ns", STAMPS),
+        (None, Some(sweep_s)) => Ok(PyArray1::from_vec(py, even_stamps_ns(geometry, sweep_s)?)),
+        _ => Err(errors::scan(
+            "the times of the azimuths are needed: pass either azimuth_stamp_ns, one int64 for each, or sweep_s, the duration of the sweep",
+        )),
+    }
+}
+
 /// Returns times of azimuths at equal intervals, with the scan's time as their mean.
-fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<i64>> {
+fn even_stamps_ns(geometry: &SweepGeometry, sweep_s: f64) -> PyResult<Vec<i64>> {
     if !(sweep_s > 0.0 && sweep_s <= 10.0) {
         let sentence = format!("sweep_s is {sweep_s}, but must be above 0 and at most 10 s");
         return Err(errors::scan(sentence));
     }
+    let (stamp_ns, azimuths) = (geometry.stamp_ns, geometry.azimuths);
     let (sweep_ns, n) = ((sweep_s * 1e9) as i64, azimuths.max(1) as i64);
     let start_ns = stamp_ns.saturating_sub(sweep_ns * (n - 1) / (2 * n));
     let stamps =
@@ -261,52 +299,28 @@ impl Scan {
         wheels: Option<Vec<(i64, f64)>>,
     ) -> PyResult<Self> {
         let py = power.py();
-        let array = given::<u8, Ix2>(power, "power", POWER)?;
-        if !array.is_c_contiguous() {
-            return Err(PyValueError::new_err(
-                "power is not C-contiguous, and is not copied silently: pass np.ascontiguousarray(power)",
-            ));
-        }
-        let [azimuths, bins] = [array.shape()[0], array.shape()[1]];
-        if azimuths == 0 || bins == 0 {
-            return Err(errors::scan(format!(
-                "power has shape ({azimuths}, {bins}), but a scan has azimuths and range bins"
-            )));
-        }
-        let stamps = match (azimuth_stamp_ns, sweep_s) {
-            (Some(stamps), None) => converted(stamps, "azimuth_stamp_ns", STAMPS)?,
-            (None, Some(sweep_s)) => {
-                PyArray1::from_vec(py, even_stamps_ns(stamp_ns, sweep_s, azimuths)?)
-            }
-            _ => {
-                return Err(errors::scan(
-                    "the times of the azimuths are needed: pass either azimuth_stamp_ns, one int64 for each, or sweep_s, the duration of the sweep",
-                ));
-            }
+        let geometry = SweepGeometry {
+            range_resolution_m,
+            range_offset_m,
+            doppler_s,
+            sense: match clockwise {
+                true => Sense::Clockwise,
+                false => Sense::CounterClockwise,
+            },
+            stamp_ns,
+            ..layout(power)?
         };
+        let stamps = stamps(py, &geometry, azimuth_stamp_ns, sweep_s)?;
         let angles = match azimuth_rad {
             Some(angles) => converted(angles, "azimuth_rad", ANGLES)?,
-            None => PyArray1::from_vec(py, even_angles_rad(azimuths)),
+            None => PyArray1::from_vec(py, even_angles_rad(geometry.azimuths)),
         };
         let flags = match azimuth_flags {
             Some(flags) => given::<u8, Ix1>(flags, "azimuth_flags", FLAGS)?,
-            None => PyArray1::from_vec(py, vec![flag::MEASURED; azimuths]),
+            None => PyArray1::from_vec(py, vec![flag::MEASURED; geometry.azimuths]),
         };
         let scan = Self {
-            geometry: SweepGeometry {
-                azimuths,
-                bins,
-                stride: bins,
-                first_byte: 0,
-                range_resolution_m,
-                range_offset_m,
-                doppler_s,
-                sense: match clockwise {
-                    true => Sense::Clockwise,
-                    false => Sense::CounterClockwise,
-                },
-                stamp_ns,
-            },
+            geometry,
             bytes: power.clone().unbind(),
             power: power.clone().unbind(),
             azimuth_rad: angles.into_any().unbind(),

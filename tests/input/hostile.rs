@@ -10,6 +10,7 @@ use std::{
 
 use gyre_journal as journal;
 use gyre_slam::{Keyframe, Place, Query, records_path};
+use tempfile::TempDir;
 
 use crate::common::{Ended, Run, recording, undisturbed, wrapped};
 
@@ -37,6 +38,17 @@ fn sparse(file: &Path) {
     File::create(file).unwrap().set_len(100 << 30).unwrap();
 }
 
+fn recording_of_vast_images() -> TempDir {
+    let recording = recording::copy(2);
+    for image in recording::images(recording.path()) {
+        let mut bytes = fs::read(&image).unwrap();
+        fs::remove_file(&image).unwrap();
+        bytes[16..20].copy_from_slice(&(1_u32 << 31).to_be_bytes());
+        fs::write(&image, bytes).unwrap();
+    }
+    recording
+}
+
 /// Files are opened by one reader, which has tests of its own; here, each command reads by it.
 #[test]
 fn files_without_end_are_refused_whatever_reads_them() {
@@ -55,13 +67,7 @@ fn files_without_end_are_refused_whatever_reads_them() {
     symlink("/dev/zero", &settings).unwrap();
     let simulated = tempfile::tempdir().unwrap();
     symlink("/dev/zero", simulated.path().join("simulation.toml")).unwrap();
-    let images = recording::copy(2);
-    for image in recording::images(images.path()) {
-        let mut bytes = fs::read(&image).unwrap();
-        fs::remove_file(&image).unwrap();
-        bytes[16..20].copy_from_slice(&(1_u32 << 31).to_be_bytes());
-        fs::write(&image, bytes).unwrap();
-    }
+    let images = recording_of_vast_images();
     let models = Path::new(crate::PROJECT).join("shared/method/masking/tests/models");
     let card = file("single-127.toml");
     fs::copy(models.join("single-127.toml"), &card).unwrap();
@@ -71,29 +77,21 @@ fn files_without_end_are_refused_whatever_reads_them() {
         let run = ["run", small, "--out", path(&out)].join("\n");
         let model = format!(
             "masking.kind=learned\n--set\nmasking.model='{}'",
-            card.display()
+            path(card)
         );
         format!("{run}\n--set\nraster.n=127\n--set\nraster.cell_m=0.8\n--set\n{model}")
     };
     let evaluate = format!("evaluate\n{}", path(&estimate));
     let motions = format!("{}\n--odometry\n{}", path(&estimate), path(&motions));
-    let simulated = path(simulated.path());
+    let simulate = format!("simulate\n--out\n{}", path(simulated.path()));
+    let inspect = |data: &Path| format!("inspect\n{}", path(data));
     // The arguments by lines.
     for (arguments, expected) in [
         ("run\n/dev/zero".to_owned(), ["/dev/zero", "it is a device"]),
         (format!("run\n{}", path(&run)), ["run.toml", "16 MB"]),
-        (
-            format!("inspect\n{}", path(endless.path())),
-            ["dataset.toml", "a device"],
-        ),
-        (
-            format!("inspect\n{}", path(images.path())),
-            ["png", "too large"],
-        ),
-        (
-            format!("simulate\n--out\n{simulated}"),
-            ["simulation.toml", "a device"],
-        ),
+        (inspect(endless.path()), ["dataset.toml", "a device"]),
+        (inspect(images.path()), ["png", "too large"]),
+        (simulate, ["simulation.toml", "a device"]),
         (format!("{evaluate}\n{}", path(&truth)), ["truth.tum", ""]),
         (format!("{evaluate}\n{motions}"), ["odometry.csv", "line"]),
         (learned(Path::new("/dev/zero")), ["/dev/zero", "a device"]),

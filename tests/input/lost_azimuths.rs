@@ -58,10 +58,11 @@ fn misplaced(scans: &[OwnedScan], whole: &[OwnedScan], stale: &[usize]) -> f64 {
     off.iter().sum::<f64>() / off.len() as f64
 }
 
-fn export(run: &Run, out: &Path) -> Ended {
+const AS_IMAGES: [&str; 2] = ["--format=radiate", "--out"];
+
+fn export(from: &Path, options: &[&str], to: &Path) -> Ended {
     let mut command = gyre();
-    command.arg("export").arg(run.out());
-    command.args(["--format", "radiate", "--out"]).arg(out);
+    command.arg("export").arg(from).args(options).arg(to);
     Ended::of(command)
 }
 
@@ -79,7 +80,7 @@ fn lost_azimuths_are_counted_and_put_back_in_an_export() {
     assert_eq!(run.summary()["lost"], counts);
 
     let out = run.folder().join("repaired");
-    let said = export(&run, &out);
+    let said = export(run.out(), &AS_IMAGES, &out);
     said.succeeded();
     let sentence = format!("{repaired} of them repaired, which had lost {lost} azimuths");
     assert!(said.stdout.contains(&sentence), "{}", said.stdout);
@@ -98,28 +99,23 @@ fn lost_azimuths_are_counted_and_put_back_in_an_export() {
         let copied = fs::read(out.join(list)).unwrap();
         assert_eq!(copied, fs::read(lossy.join(list)).unwrap(), "{list}");
     }
-    let options = stored_options(&out).unwrap();
     let expected = DatasetOptions {
         lost_azimuths: Some(LostAzimuthOption::Ignore),
         ..stored_options(&lossy).unwrap()
     };
-    assert_eq!(options, expected);
-    export(&run, &out).failed_with(&["repaired exists: name a new folder"]);
+    assert_eq!(stored_options(&out).unwrap(), expected);
+    let again = export(run.out(), &AS_IMAGES, &out);
+    again.failed_with(&["repaired exists: name a new folder"]);
 
     let bag = run.folder().join("bag.mcap");
-    let mut command = gyre();
-    command.arg("export").arg(run.out()).arg("--mcap").arg(&bag);
-    let ended = Ended::of(command);
+    let ended = export(run.out(), &["--mcap"], &bag);
     let said = &ended.succeeded().stderr;
     let sentence = format!("{repaired} scans have lost azimuths: their rows are at the angles");
     assert!(said.contains(&sentence), "{said}");
     let mut dataset = gyre_recording::open(&bag, &DatasetOptions::default()).unwrap();
     let misplaced = |scans: &[OwnedScan]| misplaced(scans, &true_scans, &stale_before);
     let (wrong, right) = (misplaced(&before), misplaced(&read_all(dataset.as_mut())));
-    assert!(
-        right < 0.85 * wrong,
-        "{wrong} steps as recorded, {right} in the bag"
-    );
+    assert!(right < 0.85 * wrong, "{wrong} steps, {right} in the bag");
 }
 
 #[test]
@@ -129,13 +125,12 @@ fn only_runs_that_have_looked_for_lost_azimuths_are_exported_in_radiate_s_form()
     ignoring.complete();
     assert!(ignoring.summary().get("lost").is_none());
     let out = ignoring.folder().join("repaired");
-    export(&ignoring, &out).failed_with(&["the run has not looked for lost azimuths"]);
+    let ended = export(ignoring.out(), &AS_IMAGES, &out);
+    ended.failed_with(&["the run has not looked for lost azimuths"]);
     let other = Run::of_recording();
     other.complete();
-    export(&other, &out).failed_with(&["are of the format `oxford`"]);
-    let mut command = gyre();
-    command.arg("export").arg(recording::of_radiate(true));
-    command.args(["--format", "radiate", "--out"]).arg(&out);
-    Ended::of(command).failed_with(&["name the folder of its results"]);
+    export(other.out(), &AS_IMAGES, &out).failed_with(&["are of the format `oxford`"]);
+    let ended = export(&recording::of_radiate(true), &AS_IMAGES, &out);
+    ended.failed_with(&["name the folder of its results"]);
     assert!(!out.exists());
 }

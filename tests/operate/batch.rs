@@ -185,6 +185,21 @@ const OUTCOMES: [&str; 9] = [
     "simulated complete",
 ];
 
+fn kill_all_then_the_batch_then_a_run(batch: &Batch<'_>) {
+    let mut started = batch.start();
+    started.await_run_after(0);
+    kill_process_group(started.pid(), Signal::KILL).unwrap();
+    assert_eq!(started.wait(), None);
+    let mut started = batch.start();
+    started.await_run_after(1);
+    send(started.pid().as_raw_pid() as u32, Signal::KILL);
+    assert_eq!(started.wait(), None);
+    let mut started = batch.start();
+    let supervisor = started.await_run_after(2);
+    send(supervisor, Signal::KILL);
+    assert_eq!(started.wait(), Some(1));
+}
+
 #[test]
 #[ignore = ".ci/nightly: kills at many moments"]
 fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
@@ -211,18 +226,7 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     assert_eq!(ended.stderr.lines().count(), 9, "{}", ended.stderr);
 
     let killed = drives.batch("killed").with(&paced);
-    let mut started = killed.start();
-    started.await_run_after(0);
-    kill_process_group(started.pid(), Signal::KILL).unwrap();
-    assert_eq!(started.wait(), None);
-    let mut started = killed.start();
-    started.await_run_after(1);
-    send(started.pid().as_raw_pid() as u32, Signal::KILL);
-    assert_eq!(started.wait(), None);
-    let mut started = killed.start();
-    let supervisor = started.await_run_after(2);
-    send(supervisor, Signal::KILL);
-    assert_eq!(started.wait(), Some(1));
+    kill_all_then_the_batch_then_a_run(&killed);
     assert!(killed.outcomes().iter().any(|it| it.ends_with(" killed")));
     let last = killed.finish().stdout;
     let before = "had been computed before";

@@ -44,6 +44,14 @@ fn expect(is_refused: bool, command: &str, place: &Path) {
     assert_eq!(found, is_refused, "{command}: {}", ended.stderr);
 }
 
+/// Makes a FIFO and, as root, a device like /dev/null, else a second FIFO.
+fn make_pipe_and_device(places: [std::path::PathBuf; 2]) {
+    let make = "mkfifo \"$0\" && (mknod \"$1\" c 1 3 || mkfifo \"$1\")";
+    let mut made = Command::new("sh");
+    made.args(["-c", make]).args(places);
+    assert!(made.status().unwrap().success());
+}
+
 #[test]
 fn no_command_replaces_what_is_not_its_own() {
     let run = Run::of_recording().set("slam.kind=graph");
@@ -80,14 +88,10 @@ fn no_command_replaces_what_is_not_its_own() {
         }
         let is_kept = |file| fs::read(file).unwrap() == b"mine";
         assert!(theirs.iter().all(is_kept), "{command}");
-        // A FIFO and, as root, a device like /dev/null: a page is written to them.
-        let make = "mkfifo \"$0\" && (mknod \"$1\" c 1 3 || mkfifo \"$1\")";
-        let mut made = Command::new("sh");
-        made.args(["-c", make]).args([at("fifo"), at("null")]);
-        assert!(made.status().unwrap().success());
-        let (fifo, is) = (at("fifo"), |name| {
-            fs::metadata(at(name)).unwrap().file_type()
-        });
+        // A page is written to them.
+        make_pipe_and_device([at("fifo"), at("null")]);
+        let fifo = at("fifo");
+        let is = |name| fs::metadata(at(name)).unwrap().file_type();
         if command.starts_with("report ") {
             let reader = thread::spawn(move || fs::read_to_string(fifo).unwrap());
             execute(command, &at("fifo")).succeeded();

@@ -44,6 +44,13 @@ fn replace(program: &Path, content: impl AsRef<[u8]>) {
     fs::rename(new, program).unwrap();
 }
 
+/// Returns the content before: what follows the last section is not executed.
+fn make_another_build(program: &Path) -> Vec<u8> {
+    let whole = fs::read(program).unwrap();
+    replace(program, [&whole[..], b"another build"].concat());
+    whole
+}
+
 fn by(program: &Path, run: &Run) -> Command {
     let own = run.command();
     let mut command = Command::new(program);
@@ -69,6 +76,18 @@ fn install_model(name: &str, ours: &Path) {
     fs::copy(card(name), ours).unwrap();
     let file = card(name).with_extension("onnx");
     fs::copy(&file, ours.with_file_name(file.file_name().unwrap())).unwrap();
+}
+
+/// An image is missing and then truncated, which is refused, and put back.
+fn change_image(recording: &TempDir, refused: impl Fn(&[&str])) {
+    let image = &recording::images(recording.path())[20];
+    let away = recording.path().join("away.png");
+    fs::rename(image, &away).unwrap();
+    refused(&["another recording", "it had 24 scans and now has 23"]);
+    fs::copy(&away, image).unwrap();
+    recording::truncate(image, 50_000);
+    refused(&["another recording", "its images had"]);
+    fs::rename(&away, image).unwrap();
 }
 
 /// One after the other is changed, refused by name, and put back; the same command continues.
@@ -106,19 +125,9 @@ fn unfinished_and_complete_runs_are_kept_until_they_are_replaced_on_purpose() {
         let (path, stored) = change_options(&recording);
         refused(&run, &["dataset.range_offset_m was", "is now 0.5"]);
         fs::write(&path, stored).unwrap();
-        let images = recording::images(recording.path());
-        let away = recording.path().join("away.png");
-        fs::rename(&images[20], &away).unwrap();
-        let fewer = ["another recording", "it had 24 scans and now has 23"];
-        refused(&run, &fewer);
-        fs::copy(&away, &images[20]).unwrap();
-        recording::truncate(&images[20], 50_000);
-        refused(&run, &["another recording", "its images had"]);
-        fs::rename(&away, &images[20]).unwrap();
+        change_image(&recording, |words| refused(&run, words));
         let program = program_in(run.folder());
-        let whole = fs::read(&program).unwrap();
-        // What follows the last section is not executed.
-        replace(&program, [&whole[..], b"another build"].concat());
+        let whole = make_another_build(&program);
         let ended = run.start_as(by(&program, &run)).finish();
         ended.refused_with(&[state, "program", "gyre was build", "and is now build"]);
         replace(&program, whole);
@@ -158,9 +167,7 @@ fn a_replaced_stage_whose_program_changes_during_the_run_is_not_started_again() 
 fn a_stage_of_another_build_is_refused() {
     let run = Run::of_recording();
     let program = program_in(run.folder());
-    let mut other = fs::read(crate::PROGRAM).unwrap();
-    other.extend(b"another build");
-    replace(&program, other);
+    make_another_build(&program);
     let command = format!(
         "stages.masking.command=['{}','stage','masking']",
         program.display()

@@ -47,12 +47,8 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     second.complete();
     let out = second.folder().join("map");
     let ended = extend(&second, &map, &out);
-    ended.succeeded();
-    assert!(
-        ended.stderr.contains("keyframes were found in"),
-        "{}",
-        ended.stderr
-    );
+    let said = &ended.succeeded().stderr;
+    assert!(said.contains("keyframes were found in"), "{said}");
     let [earlier, all] = [&map, &out].map(|folder| Map::open(folder).unwrap());
     let count = earlier.keyframes().len();
     for (kept, keyframe) in all.keyframes().iter().zip(earlier.keyframes()) {
@@ -60,11 +56,8 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
         let moved = kept.pose.motion.inv_mul(&keyframe.pose.motion);
         let is_there =
             moved.translation.vector.norm() < 1e-12 && moved.rotation.angle().abs() < 1e-12;
-        assert!(
-            is_there && kept.points == keyframe.points,
-            "scan {}",
-            keyframe.scan
-        );
+        let is_kept = is_there && kept.points == keyframe.points;
+        assert!(is_kept, "scan {}", keyframe.scan);
     }
     let truth = |run: &Run| read_trajectory(&run.out().join("ground_truth.tum")).unwrap();
     // The map's frame is the frame of the first scan of the first drive.
@@ -74,29 +67,23 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     for keyframe in added {
         let expected = start.inv_mul(&truth.near(keyframe.stamp_ns, 1_000).unwrap());
         let error = expected.inv_mul(&keyframe.pose.motion);
-        let (error_m, error_deg) = (
-            error.translation.vector.norm(),
-            error.rotation.angle().to_degrees(),
-        );
+        let error_m = error.translation.vector.norm();
+        let error_deg = error.rotation.angle().to_degrees();
         assert!(
             error_m < 0.5 && error_deg.abs() < 0.5,
             "scan {}: {error_m} m, {error_deg} deg",
             keyframe.scan
         );
     }
-    assert_eq!(
-        gyre_slam::mapping::Map::open(&out).unwrap().keyframes(),
-        all.keyframes().len()
-    );
+    let drawn = gyre_slam::mapping::Map::open(&out).unwrap();
+    assert_eq!(drawn.keyframes(), all.keyframes().len());
     assert!(out.join("map.png").is_file());
     // A third one is placed in both.
     let again = second.folder().join("again");
     extend(&second, &out, &again).succeeded();
     let of_three = Map::open(&again).unwrap();
-    assert_eq!(
-        of_three.keyframes().len(),
-        all.keyframes().len() + added.len()
-    );
+    let count = all.keyframes().len() + added.len();
+    assert_eq!(of_three.keyframes().len(), count);
 }
 
 #[test]

@@ -97,21 +97,15 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("found");
     let ended = localise(&map_of(&run), TOWN, &out);
-    ended.succeeded();
-    assert!(
-        ended.stdout.starts_with("first fix: scan 0"),
-        "{}",
-        ended.stdout
-    );
+    let said = &ended.succeeded().stdout;
+    assert!(said.starts_with("first fix: scan 0"), "{said}");
     let truth = read_trajectory(&first_drive().join("ground_truth.tum")).unwrap();
     let first = truth.poses[0];
     let rows = rows(&out);
     assert_eq!(rows.len(), truth.poses.len());
     for (number, (_, status, place)) in rows.iter().enumerate() {
-        assert!(
-            status == "found" || status == "tracked",
-            "{number}: {status}"
-        );
+        let has_fix = status == "found" || status == "tracked";
+        assert!(has_fix, "{number}: {status}");
         // Both drives follow one path at one pace; the map's frame is the frame of its first scan,
         // and the map itself deviates from it by up to 0.61 m.
         let expected = first.inv_mul(&truth.poses[number]);
@@ -120,10 +114,8 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
         assert!(error_m < 0.7 && error_rad.abs() < 0.02, "{number}: {error}");
     }
     let places = read_trajectory(&out.join("fixes.tum")).unwrap();
-    assert_eq!(
-        places.stamp_ns,
-        Some(rows.iter().map(|row| row.0).collect())
-    );
+    let stamps_ns: Vec<i64> = rows.iter().map(|row| row.0).collect();
+    assert_eq!(places.stamp_ns, Some(stamps_ns));
     for ((.., place), pose) in rows.iter().zip(&places.poses) {
         let apart = place.unwrap().inv_mul(pose);
         assert!(apart.translation.vector.norm() < 1e-3, "{apart}");

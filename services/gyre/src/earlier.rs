@@ -96,16 +96,21 @@ impl Earlier {
         if content.poses == 0 && !content.ended {
             return Ok(without_poses(out, configuration, programs));
         }
-        let identity = match Identity::read(out) {
-            Err(reason) => return Ok(Self::Foreign(reason)),
-            Ok(identity) => identity,
-        };
-        if let Err(another) = identity.require(configuration, programs) {
-            return Ok(Self::Foreign(foreign(out, UNFINISHED, &another)));
+        match same_run(out, configuration, programs, UNFINISHED) {
+            Err(reason) => Ok(Self::Foreign(reason)),
+            Ok(identity) => Self::begun(out, configuration, &content, identity),
         }
+    }
+
+    fn begun(
+        out: &Out,
+        configuration: &Configuration,
+        content: &Content,
+        identity: Identity,
+    ) -> Result<Self, Failure> {
         let poses = match content.ended {
             true => content.poses,
-            false => known_poses(out, configuration, &content)?,
+            false => known_poses(out, configuration, content)?,
         };
         let begun = Begun {
             poses,
@@ -116,9 +121,8 @@ impl Earlier {
             && (!configuration.objects.is_on() || has_ended::<LoggedObjects>(out)?);
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
-            (true, _) => Self::Unfinished(begun),
             (false, 0) => Self::WithoutPoses(begun.identity),
-            (false, _) => Self::Unfinished(begun),
+            _ => Self::Unfinished(begun),
         })
     }
 
@@ -172,14 +176,23 @@ fn foreign(out: &Out, state: &str, another: &Failure) -> Failure {
     .into()
 }
 
+/// Returns the identity of the run in the folder; an error if the new run is another.
+fn same_run(
+    out: &Out,
+    configuration: &Configuration,
+    programs: &Programs,
+    state: &str,
+) -> Result<Identity, Failure> {
+    let identity = Identity::read(out)?;
+    let required = identity.require(configuration, programs);
+    required.map_err(|another| foreign(out, state, &another))?;
+    Ok(identity)
+}
+
 /// Anything begun there may begin again, and the same run may continue its recording.
 fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) -> Earlier {
-    match Identity::read(out) {
-        Ok(identity) if identity.require(configuration, programs).is_ok() => {
-            Earlier::WithoutPoses(identity)
-        }
-        _ => Earlier::Nothing,
-    }
+    let same = same_run(out, configuration, programs, UNFINISHED);
+    same.map_or(Earlier::Nothing, Earlier::WithoutPoses)
 }
 
 /// A complete run may be replaced by the same results without being asked for it.
@@ -188,9 +201,7 @@ fn complete(
     configuration: &Configuration,
     programs: &Programs,
 ) -> Result<Earlier, Failure> {
-    let identity = Identity::read(out)?;
-    let required = identity.require(configuration, programs);
-    required.map_err(|another| foreign(out, COMPLETED, &another))?;
+    let identity = same_run(out, configuration, programs, COMPLETED)?;
     // Drops in live mode depend on the load, and the base has the scans of its robot.
     let is_live = configuration.is_radar() || configuration.run.mode == Mode::Live;
     if is_live || configuration.is_side(Side::Base) {

@@ -32,7 +32,7 @@ pub mod watch;
 
 use std::{path::PathBuf, process::ExitCode};
 
-use arguments::RunArguments;
+use arguments::{RunArguments, RunOptions};
 use cli::Command;
 use gyre_configuration::{
     Configuration, schema,
@@ -40,27 +40,13 @@ use gyre_configuration::{
 };
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
-    gyre_transport::wake::report_file_size_limit()?;
-    if is_private(&command) {
-        gyre_transport::run::keep_files_private();
-    }
+    set_up_process(&command)?;
     match command {
         Command::New { what } => gyre_tools::new::new(&what),
         Command::Stage { name, python } => Ok(stage::run(&name, python)),
-        Command::Guard => {
-            let root = std::env::var_os(gyre_transport::run::ENVIRONMENT).map(PathBuf::from);
-            gyre_supervise::guard(std::io::stdin().lock(), root.as_deref());
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::Guard => Ok(guard()),
         Command::Run(arguments) => run::run(&arguments),
-        Command::Demo { set, options } => {
-            let what = vec!["gyre:configs/demo.toml".into()];
-            run::run(&RunArguments {
-                inputs: Inputs { what, set },
-                options,
-                ..RunArguments::default()
-            })
-        }
+        Command::Demo { set, options } => run::run(&of_demo(set, options)),
         Command::Up(arguments) => gyre_tools::operate::up(&run::results_folder(&arguments)?),
         Command::Down(run) => gyre_tools::operate::down(&run),
         Command::Ps(arguments) => gyre_tools::operate::ps(&arguments),
@@ -97,25 +83,53 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => conformance::conformance(&arguments),
         Command::Config(arguments) => gyre_configuration::terminal::inputs::config(&arguments),
-        Command::Schema { markdown } => {
-            print::line(match markdown {
-                true => schema::reference(),
-                false => schema::json(),
-            })?;
-            Ok(ExitCode::SUCCESS)
-        }
-        Command::Completions { shell } => {
-            let mut text = Vec::new();
-            clap_complete::generate(shell, &mut cli::command(), "gyre", &mut text);
-            print::line(String::from_utf8_lossy(&text).trim_end())?;
-            Ok(ExitCode::SUCCESS)
-        }
-        Command::Man { folder } => {
-            gyre_storage::create_folder(&folder)?;
-            clap_mangen::generate_to(cli::command(), &folder)?;
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::Schema { markdown: true } => shown(&schema::reference()),
+        Command::Schema { markdown: false } => shown(&schema::json()),
+        Command::Completions { shell } => shown(completions(shell).trim_end()),
+        Command::Man { folder } => write_manual(&folder),
     }
+}
+
+/// The files of a command are its user's alone: all but a simulated recording. The umask of a child
+/// process may be the one that the transport sets for a moment.
+fn set_up_process(command: &Command) -> Result<(), Failure> {
+    gyre_transport::wake::report_file_size_limit()?;
+    if !matches!(command, Command::Simulate(_)) {
+        gyre_transport::run::keep_files_private();
+    }
+    Ok(())
+}
+
+fn guard() -> ExitCode {
+    let root = std::env::var_os(gyre_transport::run::ENVIRONMENT).map(PathBuf::from);
+    gyre_supervise::guard(std::io::stdin().lock(), root.as_deref());
+    ExitCode::SUCCESS
+}
+
+fn of_demo(set: Vec<String>, options: RunOptions) -> RunArguments {
+    let what = vec!["gyre:configs/demo.toml".into()];
+    RunArguments {
+        inputs: Inputs { what, set },
+        options,
+        ..RunArguments::default()
+    }
+}
+
+fn shown(text: &str) -> Result<ExitCode, Failure> {
+    print::line(text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn completions(shell: clap_complete::Shell) -> String {
+    let mut text = Vec::new();
+    clap_complete::generate(shell, &mut cli::command(), "gyre", &mut text);
+    String::from_utf8_lossy(&text).into_owned()
+}
+
+fn write_manual(folder: &std::path::Path) -> Result<ExitCode, Failure> {
+    gyre_storage::create_folder(folder)?;
+    clap_mangen::generate_to(cli::command(), folder)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Checks this machine for missing requirements of a run of the default configuration, whose scans
@@ -124,10 +138,4 @@ fn doctor() -> Result<ExitCode, Failure> {
     let simulated = Configuration::of_overrides(&["simulation.scans=2".to_owned()])?;
     let checked = preflight::check(&simulated, &mut preflight::ask)?;
     gyre_tools::doctor::doctor(&checked.footprint)
-}
-
-/// Returns whether the files of a command are its user's alone: all but a simulated recording. The
-/// umask of a child process may be the one that the transport sets for a moment.
-fn is_private(command: &Command) -> bool {
-    !matches!(command, Command::Simulate(_))
 }

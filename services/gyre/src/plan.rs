@@ -13,11 +13,12 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
     let live = configuration.run.mode == Mode::Live;
     let plan = |name: &str| {
         let own = configuration.stages.get(name).cloned().unwrap_or_default();
-        let is_base = configuration.is_side(Side::Base) && configuration.is_link(name);
+        let is_link = configuration.is_link(name);
+        let is_base = configuration.is_side(Side::Base) && is_link;
         let gyre = gyre.to_string_lossy();
         // The supervisor keeps its own program open; programs of others can change under their
         // names.
-        let (command, programs) = match configuration.is_link(name) {
+        let (command, programs) = match is_link {
             true => (StageConfig::own_command(&gyre, name, None), Vec::new()),
             false => (
                 own.command(&gyre, name),
@@ -32,9 +33,7 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
             programs,
             scheduling,
             restart: own.restart,
-            outlives_restarts: live
-                && name == StageId::RadarReplay.name()
-                && !configuration.is_link(name),
+            outlives_restarts: live && name == StageId::RadarReplay.name() && !is_link,
             // Live masking alone knows which scans it admitted, and on a base the link which of
             // them have come.
             restarts_all: live && (name == StageId::Masking.name() || is_base),
@@ -46,9 +45,8 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
             ..StagePlan::new(name, command)
         }
     };
-    let stages = StageId::ALL
-        .into_iter()
-        .filter(|stage| configuration.starts(*stage));
+    let stages = StageId::ALL.into_iter();
+    let stages = stages.filter(|stage| configuration.starts(*stage));
     let window = configuration.window(None, 1);
     // With keyframes for the other side of a link there is no SLAM here.
     let has_slam = configuration.slam.is_on();
@@ -56,11 +54,8 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
     let followers = FollowerId::ALL.into_iter();
     let followers = followers.filter(|it| is_here(it) && it.is_in(&window));
     let followers = followers.map(FollowerId::name);
-    stages
-        .map(StageId::name)
-        .chain(followers)
-        .map(plan)
-        .collect()
+    let names = stages.map(StageId::name).chain(followers);
+    names.map(plan).collect()
 }
 
 pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StagePlan> {

@@ -76,7 +76,12 @@ pub(crate) fn compute(
     match Earlier::of(&out, &configuration, &programs, fresh)? {
         Earlier::Foreign(reason) if !earlier::is_closed(&configuration) => Err(reason),
         Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun, form),
-        earlier => play(&configuration, &programs, out, &earlier, form),
+        earlier => match play(&configuration, &programs, out, &earlier, form) {
+            Err(error) if matches!(error.downcast_ref(), Some(RunError::Stopped)) => {
+                Ok(ExitCode::from(INTERRUPTED))
+            }
+            ended => ended,
+        },
     }
 }
 
@@ -169,61 +174,24 @@ fn play(
 ) -> Result<ExitCode, Failure> {
     let (mut notifier, mut signals) = (Notifier::of_environment(), None);
     let mut ask = |it: &Configuration| waiting::for_radar(it, &out, (&mut notifier, &mut signals));
-    let ready = match make_ready(configuration, programs, &out, earlier, &mut ask) {
-        Err(error) if matches!(error.downcast_ref(), Some(RunError::Stopped)) => {
-            return Ok(ExitCode::from(INTERRUPTED));
-        }
-        ready => ready?,
-    };
-    let Ready {
-        resolved, checked, ..
-    } = &ready;
+    let ready = make_ready(configuration, programs, &out, earlier, &mut ask)?;
+    let (resolved, checked) = (&ready.resolved, &ready.checked);
     let unfinished = earlier.unfinished();
     let signals = signals.map_or_else(Signals::install, Ok)?;
     if let Earlier::Foreign(reason) = earlier {
         out = earlier::close(out, reason)?;
     }
-    let root = match RunRoot::acquire(out.path(), &signals) {
-        Err(RunError::Stopped) => return Ok(ExitCode::from(INTERRUPTED)),
-        root => root?,
-    };
+    let root = RunRoot::acquire(out.path(), &signals)?;
     preflight::check_shared_memory(&checked.footprint)?;
     prepare(configuration, &ready, &out, unfinished)?;
-    let manifest = Manifest {
-        prefix: root.prefix(),
-        root: root.path().to_owned(),
-        ..checked.manifest(resolved, out.path(), programs.build.clone())
-    };
-    let plan = plan_of(resolved, manifest);
-    plan.manifest.write(&resolved.to_toml()?)?;
-    if let Some(recording) = &checked.scans.recording {
-        let path = root.path().display();
-        let failed = |error| format!("cannot write to {path}: {error}");
-        recording.listing.write(root.path()).map_err(failed)?;
-    }
+    let plan = plan_in(&root, &ready, programs, &out)?;
 
     describe_masks(resolved)?.iter().for_each(print::note);
     describe_objects(resolved)?.iter().for_each(print::note);
     resolved.link.describe().iter().for_each(print::note);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
-    let mut progress = Progress::new(checked.scans.count, resumed, &checked.footprint);
-    if resolved.is_radar() {
-        progress.watch_radar(resolved.data(), plan.manifest.clone());
-    }
     let started = Instant::now();
-    log_session(&plan.manifest, BEGUN);
-    let report = supervise(&plan, signals, &mut |event| {
-        progress.show(&event);
-        notifier.report(&event);
-    });
-    let end = match &report {
-        Ok(report) if report.ending == Ending::Complete => "the run is complete".to_owned(),
-        Ok(_) => "the run was interrupted".to_owned(),
-        Err(error) => format!("the run failed: {error}"),
-    };
-    log_session(&plan.manifest, &end);
-    progress.finish();
-    notifier.writing();
+    let report = supervise_shown(&plan, signals, &ready, resumed, &mut notifier);
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
         let begins_anew = earlier::is_untouched(&out)?;
         drop((root, out));
@@ -267,17 +235,59 @@ fn prepare(
     Ok(storage::create_folder(&out.join("log"))?)
 }
 
-fn plan_of(configuration: &Configuration, manifest: Manifest) -> Plan {
-    let gyre = own();
-    Plan {
-        stages: plan::stage_plans(configuration, &gyre),
-        recorder: plan::recorder(&configuration.record, &gyre, &manifest.out),
-        guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
-        stall_timeout: limit(configuration.run.stall_timeout_s),
-        start_timeout: limit(configuration.run.start_timeout_s),
-        cpu_wake_us: configuration.run.cpu_wake_us,
-        manifest,
+/// Writes the inputs of the processes to the root of the run, and returns the plan of their start.
+fn plan_in(root: &RunRoot, ready: &Ready, programs: &Programs, out: &Out) -> Result<Plan, Failure> {
+    let (resolved, checked, gyre) = (&ready.resolved, &ready.checked, own());
+    let manifest = Manifest {
+        prefix: root.prefix(),
+        root: root.path().to_owned(),
+        ..checked.manifest(resolved, out.path(), programs.build.clone())
+    };
+    manifest.write(&resolved.to_toml()?)?;
+    if let Some(recording) = &checked.scans.recording {
+        let path = root.path().display();
+        let failed = |error| format!("cannot write to {path}: {error}");
+        recording.listing.write(root.path()).map_err(failed)?;
     }
+    Ok(Plan {
+        stages: plan::stage_plans(resolved, &gyre),
+        recorder: plan::recorder(&resolved.record, &gyre, &manifest.out),
+        guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
+        stall_timeout: limit(resolved.run.stall_timeout_s),
+        start_timeout: limit(resolved.run.start_timeout_s),
+        cpu_wake_us: resolved.run.cpu_wake_us,
+        manifest,
+    })
+}
+
+/// Supervises the processes to their end, and shows and logs how the run goes.
+fn supervise_shown(
+    plan: &Plan,
+    signals: Signals,
+    Ready {
+        resolved, checked, ..
+    }: &Ready,
+    resumed: usize,
+    notifier: &mut Notifier,
+) -> Result<Report, SuperviseError> {
+    let mut progress = Progress::new(checked.scans.count, resumed, &checked.footprint);
+    if resolved.is_radar() {
+        progress.watch_radar(resolved.data(), plan.manifest.clone());
+    }
+    log_session(&plan.manifest, BEGUN);
+    let report = supervise(plan, signals, &mut |event| {
+        progress.show(&event);
+        notifier.report(&event);
+    });
+    let end = match &report {
+        Ok(report) if report.ending == Ending::Complete => "the run is complete".to_owned(),
+        Ok(_) => "the run was interrupted".to_owned(),
+        Err(error) => format!("the run failed: {error}"),
+    };
+    log_session(&plan.manifest, &end);
+    progress.finish();
+    notifier.writing();
+    report
 }
 
 /// `None`: no limit.

@@ -113,19 +113,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         budget: configuration.budget.clone(),
         shared_bytes: checked.footprint.total() as u64,
     };
-    let options = Options {
-        scenarios: match arguments.scenarios.is_empty() {
-            true => possible(&tested),
-            false => arguments.scenarios.clone(),
-        },
-        duration: Duration::from_secs_f64(match arguments.quick {
-            true => QUICK_S,
-            false => arguments.duration,
-        }),
-        stages: arguments.stages.clone(),
-        seed: arguments.seed,
-    };
-    require_stages(&tested, &options.stages)?;
+    let options = options(arguments, &tested)?;
     let provenance = provenance(arguments, &configuration)?;
     let mut printed = Ok(());
     let judged = &mut |verdict: &str| printed = print::line(verdict);
@@ -168,9 +156,23 @@ fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
     .collect()
 }
 
-fn require_stages(tested: &TestedPipeline, stages: &[StageId]) -> Result<(), Failure> {
-    match stages.iter().find(|stage| !tested.stages.contains(stage)) {
-        None => Ok(()),
+fn options(arguments: &StressArguments, tested: &TestedPipeline) -> Result<Options, Failure> {
+    let scenarios = match arguments.scenarios.is_empty() {
+        true => possible(tested),
+        false => arguments.scenarios.clone(),
+    };
+    let duration_s = match arguments.quick {
+        true => QUICK_S,
+        false => arguments.duration,
+    };
+    let mut stages = arguments.stages.iter();
+    match stages.find(|stage| !tested.stages.contains(stage)) {
+        None => Ok(Options {
+            scenarios,
+            duration: Duration::from_secs_f64(duration_s),
+            stages: arguments.stages.clone(),
+            seed: arguments.seed,
+        }),
         Some(stage) => Err(format!("this run has no stage {}", stage.name()).into()),
     }
 }

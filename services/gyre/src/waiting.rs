@@ -2,7 +2,7 @@
 
 use std::{
     env, process,
-    sync::mpsc::channel,
+    sync::mpsc::{Receiver, channel},
     thread,
     time::{Duration, Instant},
 };
@@ -44,19 +44,7 @@ pub fn for_radar(
     };
     let signals = signals.insert(Signals::install()?);
     let root = RunRoot::acquire(out.path(), signals)?;
-    let (sender, answers) = channel();
-    let asked = configuration.clone();
-    // An attempt can take seconds. Meanwhile the run must answer requests and signals.
-    thread::spawn(move || {
-        loop {
-            thread::sleep(PAUSE);
-            let answer = ask(&asked);
-            let is_last = answer.as_ref().err().is_none_or(|error| !may_come(error));
-            if sender.send(answer).is_err() || is_last {
-                return;
-            }
-        }
-    });
+    let answers = answers_of_radar(configuration.clone());
     let status = Status {
         pid: process::id(),
         out: out.path().to_owned(),
@@ -84,4 +72,21 @@ pub fn for_radar(
         None
     });
     answer?.ok_or(RunError::Stopped)?
+}
+
+/// Asks again and again in a thread of its own: an attempt can take seconds, and meanwhile the run
+/// must answer requests and signals.
+fn answers_of_radar(asked: Configuration) -> Receiver<Result<Sizes, Failure>> {
+    let (sender, answers) = channel();
+    thread::spawn(move || {
+        loop {
+            thread::sleep(PAUSE);
+            let answer = ask(&asked);
+            let is_last = answer.as_ref().err().is_none_or(|error| !may_come(error));
+            if sender.send(answer).is_err() || is_last {
+                return;
+            }
+        }
+    });
+    answers
 }

@@ -125,13 +125,15 @@ mod tests {
 
     #[test]
     fn each_state_has_its_name_and_the_sensors_that_were_used_are_counted() {
-        let motion = |[outcome, initial_guess]: [u32; 2], gyro, wheels, doppler| RefinementRecord {
-            outcome,
-            initial_guess,
-            gyro,
-            wheels,
-            doppler,
-            ..RefinementRecord::default()
+        let of = |[outcome, initial_guess]: [u32; 2]| {
+            move |gyro, wheels, doppler| RefinementRecord {
+                outcome,
+                initial_guess,
+                gyro,
+                wheels,
+                doppler,
+                ..RefinementRecord::default()
+            }
         };
         let counted = |cases: &[(RefinementRecord, &str)]| {
             for (motion, name) in cases {
@@ -139,28 +141,19 @@ mod tests {
             }
             WitnessCounts::of(cases.iter().map(|(motion, _)| motion))
         };
-        let refined = [outcome::REFINED, initial_guess::PREDICTION];
-        let walls = [outcome::REFINED, initial_guess::ALONG_WALLS];
-        let predicted = [outcome::PREDICTED, initial_guess::PREDICTION];
+        let refined = of([outcome::REFINED, initial_guess::PREDICTION]);
+        let walls = of([outcome::REFINED, initial_guess::ALONG_WALLS]);
+        let predicted = of([outcome::PREDICTED, initial_guess::PREDICTION]);
         let counts = counted(&[
-            (motion([0, 0], 0, 0, 0), "scan to scan"),
-            (motion(refined, 0, 0, 0), "radar only"),
-            (
-                motion(refined, gyro::REFUSED, wheels::SLIP, 0),
-                "radar only",
-            ),
-            (
-                motion(refined, gyro::USED, wheels::SLIP, 0),
-                "radar and others",
-            ),
-            (
-                motion(refined, gyro::REFUSED, wheels::USED, 0),
-                "radar and others",
-            ),
-            (motion(walls, gyro::USED, wheels::USED, 0), "along walls"),
-            (motion(walls, gyro::USED, 0, 0), "way guessed"),
-            (motion(predicted, 0, wheels::USED, 0), "dead reckoning"),
-            (motion(predicted, gyro::USED, wheels::SLIP, 0), "guessed"),
+            (of([0, 0])(0, 0, 0), "scan to scan"),
+            (refined(0, 0, 0), "radar only"),
+            (refined(gyro::REFUSED, wheels::SLIP, 0), "radar only"),
+            (refined(gyro::USED, wheels::SLIP, 0), "radar and others"),
+            (refined(gyro::REFUSED, wheels::USED, 0), "radar and others"),
+            (walls(gyro::USED, wheels::USED, 0), "along walls"),
+            (walls(gyro::USED, 0, 0), "way guessed"),
+            (predicted(0, wheels::USED, 0), "dead reckoning"),
+            (predicted(gyro::USED, wheels::SLIP, 0), "guessed"),
         ]);
         assert_eq!(counts.by_basis, [1, 2, 2, 1, 1, 1, 1]);
         assert_eq!(counts.motions(), 9);
@@ -169,17 +162,15 @@ mod tests {
         let words = "gyro 44 %, 2 refused, wheels 33 %, 3 slips";
         assert_eq!(counts.in_words().as_deref(), Some(words));
         let counts = counted(&[
-            (motion(refined, 0, 0, doppler::USED), "radar and others"),
-            (motion(refined, 0, 0, doppler::REFUSED), "radar only"),
-            (motion(walls, 0, 0, doppler::USED), "along walls"),
-            (motion(walls, 0, 0, doppler::REFUSED), "way guessed"),
-            (motion(predicted, 0, 0, doppler::USED), "dead reckoning"),
+            (refined(0, 0, doppler::USED), "radar and others"),
+            (refined(0, 0, doppler::REFUSED), "radar only"),
+            (walls(0, 0, doppler::USED), "along walls"),
+            (walls(0, 0, doppler::REFUSED), "way guessed"),
+            (predicted(0, 0, doppler::USED), "dead reckoning"),
         ]);
         let words = "Doppler 60 %, 2 refused";
         assert_eq!(counts.in_words().as_deref(), Some(words));
-        assert_eq!(
-            counted(&[(motion(refined, 0, 0, 0), "radar only")]).in_words(),
-            None
-        );
+        let counts = counted(&[(refined(0, 0, 0), "radar only")]);
+        assert_eq!(counts.in_words(), None);
     }
 }

@@ -20,7 +20,6 @@ use gyre_configuration::{
 };
 use gyre_contract::StageId;
 use gyre_datasets::ground_truth::{find_ground_truth, read_trajectory};
-use gyre_journal as journal;
 use gyre_radar::Trajectory;
 use pass::{MOST_JUDGED, Pass, Read};
 use slam::Slam;
@@ -52,18 +51,10 @@ pub fn write(
     make_way: &dyn Fn(usize) -> Result<bool, Failure>,
 ) -> Result<Results, Failure> {
     let truth = truth_of(configuration, out.path());
-    // Without the corrected trajectory the run has all other results.
-    let mut slam = Slam::read(configuration, out)
-        .inspect_err(|reason| print::note(format_args!("no corrected trajectory: {reason}")))
-        .ok()
-        .flatten();
+    let mut slam = slam_of(configuration, out);
     let mut files = Files::new(out);
-    let mut pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
-    let records = journal::records(&journal::path(out.path()))?;
-    for record in records.into_iter().flatten() {
-        pass.add(&record?)?;
-    }
-    let mut read = pass.finish();
+    let pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
+    let read = pass.over(out.path())?;
     let mut corrected = None;
     if let Some(slam) = &mut slam {
         corrected = Some(add_corrected(&mut files, slam, truth.as_deref(), &read)?);
@@ -75,46 +66,55 @@ pub fn write(
         files.add("objects.csv", objects::csv(out.path())?)?;
     }
     let gnss = slam.as_mut().map(Slam::gnss).transpose()?.flatten();
-    if let Some((refusal, false)) = gnss.as_ref().and_then(|it| it.refusal()) {
-        print::note(format_args!("the fixes of GNSS are not used: {refusal}"));
-    }
     let judgement = truth.and_then(|truth| judged(&truth, &read));
-    match &judgement {
-        Some(judgement) => {
-            for (name, plot) in judgement.plots()? {
-                files.add(name, plot)?;
-            }
-        }
-        None => {
-            let svg = read.sketch.svg()?;
-            svg.map_or(Ok(()), |svg| files.add("trajectory.svg", svg))?;
-        }
+    let plots = match &judgement {
+        Some(judgement) => judgement.plots()?,
+        None => Vec::from_iter(read.sketch.svg()?.map(|svg| ("trajectory.svg", svg))),
+    };
+    for (name, plot) in plots {
+        files.add(name, plot)?;
     }
-    let latency = read.latency.latency();
-    files.add("latency.json", serde_json::to_string_pretty(&latency)?)?;
-    let refines = configuration.has(StageId::Refinement);
-    let course = read.counter.course(read.sketch.length_m);
-    let (end, first) = (read.end.as_ref(), configuration.source.first);
-    let counts = read.counter.counts(end, first, refines);
+    let ended = read.end.is_some();
     let measured = Measured {
-        counts,
-        course,
-        latency,
         evaluation: judgement,
         slam: corrected,
         gnss,
+        ..measured(configuration, read)
     };
-    let summary = Summary::new(configuration, out.path(), session, measured);
-    files.add(SUMMARY, serde_json::to_string_pretty(&summary)?)?;
-    let poses = counts.processed as usize;
-    if make_way(poses)? {
+    let latency = serde_json::to_string_pretty(&measured.latency)?;
+    files.add("latency.json", latency)?;
+    let results = Results {
+        poses: measured.counts.processed as usize,
+        ended,
+        summary: Summary::new(configuration, out.path(), session, measured),
+    };
+    files.add(SUMMARY, serde_json::to_string_pretty(&results.summary)?)?;
+    if make_way(results.poses)? {
         files.commit()?;
     }
-    Ok(Results {
-        poses,
-        ended: read.end.is_some(),
-        summary,
-    })
+    Ok(results)
+}
+
+/// Without the corrected trajectory the run has all other results.
+fn slam_of(configuration: &Configuration, out: &Out) -> Option<Slam> {
+    let note = |reason: &Failure| print::note(format_args!("no corrected trajectory: {reason}"));
+    let slam = Slam::read(configuration, out).inspect_err(note);
+    slam.ok().flatten()
+}
+
+/// Returns the figures that the journal contains.
+fn measured(configuration: &Configuration, mut read: Read) -> Measured {
+    let refines = configuration.has(StageId::Refinement);
+    let course = read.counter.course(read.sketch.length_m);
+    let (end, first) = (read.end.as_ref(), configuration.source.first);
+    Measured {
+        counts: read.counter.counts(end, first, refines),
+        course,
+        latency: read.latency.latency(),
+        evaluation: None,
+        slam: None,
+        gnss: None,
+    }
 }
 
 pub fn truth_of(configuration: &Configuration, out: &Path) -> Option<PathBuf> {

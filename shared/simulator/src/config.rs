@@ -2,13 +2,15 @@ use gyre_datasets::DatasetOptions;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::drive::DriveConfig;
-use crate::error::SimulatorError;
-use crate::gnss::SimulatedGnssConfig;
-use crate::gyro::SimulatedGyroConfig;
-use crate::output::{OutputConfig, OutputFormat};
-use crate::sensor::SensorConfig;
-use crate::wheels::SimulatedWheelsConfig;
+use crate::{
+    drive::DriveConfig,
+    error::SimulatorError,
+    gnss::SimulatedGnssConfig,
+    gyro::SimulatedGyroConfig,
+    output::{OutputConfig, OutputFormat},
+    sensor::SensorConfig,
+    wheels::SimulatedWheelsConfig,
+};
 
 pub(crate) const MAX_SCANS: usize = 100_000;
 
@@ -86,14 +88,8 @@ impl Default for SimulationConfig {
 
 impl SimulationConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        let Self {
-            drive,
-            sensor,
-            gyro,
-            wheels,
-            gnss,
-            ..
-        } = self;
+        let (drive, sensor) = (&self.drive, &self.sensor);
+        let (gyro, wheels, gnss) = (&self.gyro, &self.wheels, &self.gnss);
         let scans = self.scans.unwrap_or(1) as f64;
         let [blind_s, sees_s] = self.blind_s.unwrap_or_default();
         let [begins_m, length_m] = self.tunnel_m.unwrap_or([0.0, 10.0]);

@@ -127,32 +127,20 @@ impl Sampling {
 
 impl Profile {
     pub fn sampling(self) -> Sampling {
-        let oxford = Sampling {
-            azimuths: 400,
-            bins: 3768,
-            range_resolution_m: 0.0438,
-            range_offset_m: -0.15,
-            period_us: 250_000,
-            encoder_counts: 5600,
-            encoder_first: 13,
-            encoder_step: 14,
-            chirp: Chirp::Rising,
-            doppler_s: 0.042,
-        };
         match self {
-            Self::Cts350xOxford => oxford,
+            Self::Cts350xOxford => OXFORD,
             Self::Cts350xRadiate => Sampling {
                 bins: 576,
                 range_resolution_m: 100.0 / 576.0,
                 encoder_first: 0,
-                ..oxford
+                ..OXFORD
             },
             Self::Cir204h => Sampling {
                 bins: 3360,
                 range_resolution_m: 0.0596,
                 range_offset_m: -0.31,
                 doppler_s: 0.049,
-                ..oxford
+                ..OXFORD
             },
             Self::Ras6 => Sampling {
                 bins: 6848,
@@ -160,7 +148,7 @@ impl Profile {
                 range_offset_m: -0.31,
                 chirp: Chirp::Alternating,
                 doppler_s: 0.0505,
-                ..oxford
+                ..OXFORD
             },
             // Checchin et al. 2010, Table 1; 3600 counts are its angular precision of 0.1 degrees.
             // The Doppler shift depends on the duration of the chirp, which is not published: 0
@@ -231,6 +219,19 @@ impl Profile {
         }
     }
 }
+
+const OXFORD: Sampling = Sampling {
+    azimuths: 400,
+    bins: 3768,
+    range_resolution_m: 0.0438,
+    range_offset_m: -0.15,
+    period_us: 250_000,
+    encoder_counts: 5600,
+    encoder_first: 13,
+    encoder_step: 14,
+    chirp: Chirp::Rising,
+    doppler_s: 0.042,
+};
 
 /// Floors are measured in empty azimuths of real scans; K2Pi's is assumed.
 const OXFORD_FLOOR: [(f64, f64); 4] = [(2.5, 2.5), (5.0, 3.7), (60.0, 3.7), (150.0, 3.2)];

@@ -186,11 +186,11 @@ mod tests {
     }
 
     /// The text of a run with a live radar and a gyro.
-    fn of_sensors(mut counts: RunCounts) -> String {
+    fn of_sensors(mut counts: RunCounts, received: Received) -> String {
         counts.samples.gyro_hz = Some(208.0);
         let source = Process {
             name: "radar-replay".to_owned(),
-            received: Some(Received::default()),
+            received: Some(received),
             cpu_s: Some(1.5),
             own_bytes: Some(4096),
             ..Process::default()
@@ -209,7 +209,10 @@ mod tests {
     #[test]
     fn each_sample_stands_behind_the_help_and_the_type_of_its_family() {
         let view = view();
-        for text in [scrape(&view), of_sensors(view.counts())] {
+        for text in [
+            scrape(&view),
+            of_sensors(view.counts(), Received::default()),
+        ] {
             let (mut help, mut family, mut kind) = ("", "", "");
             let mut families = Vec::new();
             for line in text.lines() {
@@ -258,26 +261,9 @@ mod tests {
             is_receiving: true,
             ..Received::default()
         };
-        let source = Process {
-            received: Some(received),
-            ..Process::default()
-        };
         let mut counts = view.counts();
-        counts.samples = gyre_contract::SampleHealth {
-            gyro: 2080,
-            left_out: 3,
-            gyro_hz: Some(208.0),
-            ..Default::default()
-        };
-        let snapshot = Snapshot {
-            is_up: true,
-            counts,
-            processes: vec![source],
-        };
-        let mut registry = Registry::with_prefix("gyre");
-        registry.register_collector(Box::new(snapshot));
-        let mut text = String::new();
-        assert!(encode(&mut text, &registry).is_ok());
+        (counts.samples.gyro, counts.samples.left_out) = (2080, 3);
+        let text = of_sensors(counts, received);
         for line in [
             "gyre_motions_total{basis=\"dead reckoning\"} 1.0",
             "gyre_motions_total{basis=\"radar only\"} 0.0",

@@ -5,13 +5,11 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use gyre_client::{Manifest, RunError, TopicWriter, wake::Signals};
 use gyre_configuration::terminal::own;
-use gyre_contract::{Item, Pose, PoseHeader, StageId, flag};
+use gyre_contract::{Item, Pose, PoseHeader, StageId, StageTopics, flag};
 use gyre_supervise::{
     Death, Scheduling, SuperviseError,
     rig::{Process, Recorded, Rig, Tap},
 };
-
-use gyre_contract::StageTopics;
 
 #[derive(Clone, Debug)]
 pub struct Candidate {

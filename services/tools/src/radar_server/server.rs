@@ -64,26 +64,7 @@ pub fn serve(
             "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
         );
     }
-    let mut player = Player {
-        output,
-        radar,
-        faults: arguments.faults,
-        rate: arguments.rate.factor(),
-        clock: ClockFormat {
-            // Datagrams always have the network's order.
-            order: match arguments.big_endian || arguments.udp.is_some() {
-                true => ByteOrder::Big,
-                false => ByteOrder::Little,
-            },
-            ..ClockFormat::default()
-        },
-        stop,
-        message: Vec::new(),
-        started: None,
-        shift_ns: 0,
-        sweep_counter: 0,
-        played: Played::default(),
-    };
+    let mut player = Player::new(output, radar, arguments, stop);
     if !player.output.describe(&player.radar, stop) {
         return Ok(player.ended());
     }
@@ -157,7 +138,35 @@ struct Player<'a> {
     played: Played,
 }
 
-impl Player<'_> {
+impl<'a> Player<'a> {
+    fn new(
+        output: Output,
+        radar: Configuration,
+        arguments: &RadarServerArguments,
+        stop: &'a dyn Fn() -> bool,
+    ) -> Self {
+        Self {
+            output,
+            radar,
+            faults: arguments.faults,
+            rate: arguments.rate.factor(),
+            clock: ClockFormat {
+                // Datagrams always have the network's order.
+                order: match arguments.big_endian || arguments.udp.is_some() {
+                    true => ByteOrder::Big,
+                    false => ByteOrder::Little,
+                },
+                ..ClockFormat::default()
+            },
+            stop,
+            message: Vec::new(),
+            started: None,
+            shift_ns: 0,
+            sweep_counter: 0,
+            played: Played::default(),
+        }
+    }
+
     /// Sends a scan azimuth by azimuth; false on a request to stop.
     fn play(&mut self, scan: PolarScan<'_>) -> bool {
         if !self.has_client() {

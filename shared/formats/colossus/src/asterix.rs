@@ -22,9 +22,7 @@ mod write;
 pub use datagrams::Datagrams;
 pub use write::{MAX_DATAGRAM_BYTES, write_azimuth, write_description};
 
-use crate::configuration::Configuration;
-use crate::malformed::Malformed;
-use crate::message::MAX_PAYLOAD_BYTES;
+use crate::{configuration::Configuration, malformed::Malformed, message::MAX_PAYLOAD_BYTES};
 
 /// The category of ASTERIX: the first byte of a message.
 const CATEGORY: u8 = 240;
@@ -135,6 +133,13 @@ fn missing(item: &str) -> Malformed {
     Malformed::new(format!("a message lacks the item {item}"))
 }
 
+fn require(has: u16, bit: u32, item: &str) -> Result<(), Malformed> {
+    match has & 1 << bit {
+        0 => Err(missing(item)),
+        _ => Ok(()),
+    }
+}
+
 fn bad_cells([cells, first, bytes, bins]: [usize; 4]) -> Malformed {
     Malformed::new(format!(
         "a message has {cells} bins from bin {first} in {bytes} bytes, of {bins} bins"
@@ -159,9 +164,7 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
     if has & 1 << 12 == 0 || items.take("I240/000")? != [VIDEO] {
         return Ok(None);
     }
-    if has & 1 << 11 == 0 {
-        return Err(missing("I240/020"));
-    }
+    require(has, 11, "I240/020")?;
     let number = u32::from_be_bytes(items.take("I240/020")?);
     if has & 1 << 10 != 0 {
         items.blocks(1, "I240/030")?;
@@ -174,9 +177,7 @@ fn decode(datagram: &[u8]) -> Result<Option<Video<'_>>, Malformed> {
     if has & 1 << 1 != 0 {
         items.counted("RE", 1)?;
     }
-    if has & 1 == 0 {
-        return Err(missing("SP"));
-    }
+    require(has, 0, "SP")?;
     let special = special(&mut items)?;
     let bins = usize::from(special.bins);
     let cells = powers.len() / bin_bytes;
@@ -240,9 +241,7 @@ fn header(items: &mut Items<'_>, has: u16) -> Result<(u16, usize, f32), Malforme
 
 /// Takes the powers, without the padding of their blocks.
 fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malformed> {
-    if has & 1 << 7 == 0 {
-        return Err(missing("I240/048"));
-    }
+    require(has, 7, "I240/048")?;
     let [compression, resolution] = items.take("I240/048")?;
     let compressed = compression & 0x80 != 0;
     let bin_bytes = match (compressed, resolution) {
@@ -254,9 +253,7 @@ fn cells<'a>(items: &mut Items<'a>, has: u16) -> Result<(usize, &'a [u8]), Malfo
             )));
         }
     };
-    if has & 1 << 6 == 0 {
-        return Err(missing("I240/049"));
-    }
+    require(has, 6, "I240/049")?;
     let [b0, b1, c0, c1, c2] = items.take("I240/049")?;
     let bytes = usize::from(u16::from_be_bytes([b0, b1]));
     let cells = u32::from_be_bytes([0, c0, c1, c2]) as usize;

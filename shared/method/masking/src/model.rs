@@ -70,10 +70,7 @@ impl Card {
         let not_a_card = |reason: fmt::Arguments<'_>| {
             format!("masking.model is {shown}, which is not the card of a model: {reason}")
         };
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "onnx")
-        {
+        if path.extension().is_some_and(|it| it == "onnx") {
             return Err(not_a_card(format_args!(
                 "it is the model itself; its card is the .toml beside it"
             )));

@@ -1,9 +1,12 @@
 //! One pass over the journal.
 
+use std::path::Path;
+
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Item, PoseHeader, flag, run::latency::LatencyMeter};
 use gyre_datasets::ground_truth::write_tum_pose;
 use gyre_geometry::Pose;
+use gyre_journal as journal;
 use gyre_radar::Trajectory;
 use gyre_storage::Draft;
 
@@ -73,7 +76,7 @@ impl<'a, 'b> Pass<'a, 'b> {
         })
     }
 
-    pub fn add(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
+    fn add(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
         if pose.item.is(flag::END) {
             self.read.end = Some(pose.item);
             return Ok(());
@@ -126,14 +129,19 @@ impl<'a, 'b> Pass<'a, 'b> {
         }
     }
 
-    pub fn finish(self) -> Read {
+    /// Reads the journal of a run to its end.
+    pub fn over(mut self, out: &Path) -> Result<Read, Failure> {
+        let records = journal::records(&journal::path(out))?;
+        for record in records.into_iter().flatten() {
+            self.add(&record?)?;
+        }
         self.files.push(self.odometry);
         self.files.push(self.tum);
         self.files.push(self.poses);
         if let Some((_, tum)) = self.slam {
             self.files.push(tum);
         }
-        self.read
+        Ok(self.read)
     }
 }
 

@@ -3,7 +3,10 @@
 
 use std::fmt::{self, Write};
 
-use gyre_configuration::{Configuration, gnss_log, terminal::Failure};
+use gyre_configuration::{
+    Configuration, gnss_log,
+    terminal::{Failure, print},
+};
 use gyre_contract::flag;
 use gyre_datasets::GnssLog;
 use gyre_geometry::{Pose, xy_yaw};
@@ -153,7 +156,11 @@ impl Slam {
             return Ok(None);
         };
         self.estimator.scale_covariances()?;
-        Ok(Some(GnssSummary::of(log, &mut self.estimator)?))
+        let gnss = GnssSummary::of(log, &mut self.estimator)?;
+        if let Some((refusal, false)) = gnss.refusal() {
+            print::note(format_args!("the fixes of GNSS are not used: {refusal}"));
+        }
+        Ok(Some(gnss))
     }
 
     /// Returns the errors of the corrected keyframes with their standard deviations, relative to

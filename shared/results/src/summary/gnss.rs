@@ -38,8 +38,7 @@ impl GnssSummary {
     pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);
-        let squares = used.map(|it| it.chi_square * it.position.variance_m2);
-        let squares: Vec<f64> = squares.collect();
+        let squares = Vec::from_iter(used.map(|it| it.chi_square * it.position.variance_m2));
         let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         let frame = estimator.east_north_from_map()?;
         let origin = frame.zip(log.plane).map(|(frame, plane)| {
@@ -55,7 +54,6 @@ impl GnssSummary {
         let counts = fixes.counts();
         let refusal = || fixes.refusal().map(ToString::to_string);
         let refusal = log.unusable.clone().or_else(refusal);
-        let plane = log.plane.map(|plane| plane.origin());
         let mut figures = json!({
             "log": log.path.display().to_string(),
             "topic": log.topic,
@@ -78,7 +76,7 @@ impl GnssSummary {
             // The pose of the frame of `trajectory_slam.tum` in the plane of the fixes.
             "east_north": frame.as_ref().map(east_north),
             // Where that plane touches the earth: latitude and longitude (WGS 84), degrees.
-            "plane": plane.map(|it| [it.latitude_deg, it.longitude_deg]),
+            "plane": log.plane.map(|it| it.origin()).map(|it| [it.latitude_deg, it.longitude_deg]),
             // The place of that frame on the earth.
             "origin": origin,
         });

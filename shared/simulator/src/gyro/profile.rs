@@ -48,19 +48,9 @@ pub struct GyroFigures {
 
 impl GyroProfile {
     pub fn figures(self) -> Option<GyroFigures> {
-        let exact = GyroFigures {
-            rate_hz: 100.0,
-            noise_rad_per_sqrt_s: 0.0,
-            bias_sigma_radps: 0.0,
-            bias_drift_radps: 0.0,
-            bias_drift_s: TEMPERATURE_S,
-            scale_sigma: 0.0,
-            misalignment_rad: 0.0,
-            step_radps: 0.0,
-        };
         match self {
             Self::None => None,
-            Self::Exact => Some(exact),
+            Self::Exact => Some(EXACT),
             // After BST-BMI088-DS001: output noise 0.014 °/s/√Hz, zero-rate offset ±1 °/s and
             // ±0.015 °/s/K, cross axis ±1 %, sensitivity ±1 %, 16 bits for ±125 °/s. It has no bias
             // instability; Bosch's flyer states below 2 °/h.
@@ -71,7 +61,7 @@ impl GyroProfile {
                 scale_sigma: 0.01,
                 misalignment_rad: 0.01,
                 step_radps: 125.0 / 32768.0 * DEG,
-                ..exact
+                ..EXACT
             }),
             // After DocID031239: rate noise 5 mdps/√Hz, bias instability 3 °/h, zero-rate level ±1
             // °/s and ±0.005 °/s/K, 4.37 mdps a step at ±125 °/s. Sensitivity as for the BMI088.
@@ -83,7 +73,7 @@ impl GyroProfile {
                 scale_sigma: 0.01,
                 misalignment_rad: 0.01,
                 step_radps: 0.00437 * DEG,
-                ..exact
+                ..EXACT
             }),
             // After its data sheet: angle random walk 0.09 °/√h, in-run bias stability 0.8 °/h,
             // bias repeatability 0.07 °/s, sensitivity 0.2 %, axes to the frame 0.25°, 32 bits
@@ -96,8 +86,19 @@ impl GyroProfile {
                 scale_sigma: 0.002,
                 misalignment_rad: 0.25 * DEG,
                 step_radps: 0.00625 / 65536.0 * DEG,
-                ..exact
+                ..EXACT
             }),
         }
     }
 }
+
+const EXACT: GyroFigures = GyroFigures {
+    rate_hz: 100.0,
+    noise_rad_per_sqrt_s: 0.0,
+    bias_sigma_radps: 0.0,
+    bias_drift_radps: 0.0,
+    bias_drift_s: TEMPERATURE_S,
+    scale_sigma: 0.0,
+    misalignment_rad: 0.0,
+    step_radps: 0.0,
+};

@@ -15,7 +15,7 @@ use gyre_client::{
     wake::{MAX_WAIT, Signals},
 };
 use gyre_contract::{Message, Pose, Use, topic, topic_named};
-use gyre_recording::{LogTail, SplitWriter};
+use gyre_recording::{LogTail, Positions, SplitWriter};
 
 use crate::recorder::{
     begin::{begin, failed},
@@ -72,15 +72,7 @@ pub fn record(options: &Options) -> Result<Recorded, RunError> {
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
     let begun = begin(options, manifest, &topics)?;
-    let mut taps = Vec::new();
-    for name in &topics {
-        // Recording begins with the first scan, which waits for the recorder.
-        let expected = begun.earlier.as_ref();
-        let expected = expected.map(|it| it.get(name).copied().unwrap_or_default());
-        if let Some(topic) = topic(name) {
-            taps.push(Tap::on(&run, topic, expected)?);
-        }
-    }
+    let taps = taps(&run, &topics, begun.earlier.as_ref())?;
     let (to, split) = (options.to.clone(), options.split);
     let earlier = begun.earlier.unwrap_or_default();
     let writer = SplitWriter::create(to, begun.head, split, begun.ledger, earlier);
@@ -130,6 +122,19 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RunError
         topic_named(name).map_err(unknown)?;
     }
     Ok(named.to_vec())
+}
+
+fn taps<'run>(
+    run: &'run ObservedRun,
+    topics: &[String],
+    earlier: Option<&Positions>,
+) -> Result<Vec<Tap<'run>>, RunError> {
+    let tap = |name: &String| {
+        // Recording begins with the first scan, which waits for the recorder.
+        let expected = earlier.map(|it| it.get(name).copied().unwrap_or_default());
+        topic(name).map(|topic| Tap::on(run, topic, expected))
+    };
+    topics.iter().filter_map(tap).collect()
 }
 
 struct Recorder<'run> {

@@ -80,26 +80,7 @@ impl fmt::Display for Report {
         let (counts, stage) = (&self.counts, self.stage);
         let (compared, identical) = (counts.compared, counts.identical);
         let differing = compared - identical;
-        write!(
-            f,
-            "items           {} seen, {compared} compared",
-            counts.observed
-        )?;
-        for (count, what) in [
-            (counts.opening, "only to begin with"),
-            (counts.skipped, "skipped since the shadow was behind"),
-            (counts.while_starting, "passed while it started"),
-            (counts.unanswered, "not answered"),
-            (counts.left, "left at the end"),
-        ] {
-            if count > 0 {
-                write!(f, ", {count} {what}")?;
-            }
-        }
-        match counts.missed {
-            0 => writeln!(f)?,
-            missed => writeln!(f, "; {missed} missed in {} gaps", counts.gaps)?,
-        }
+        row_of_items(f, counts)?;
         writeln!(
             f,
             "results         {identical} identical, {differing} differ"
@@ -136,6 +117,26 @@ impl fmt::Display for Report {
             Verdict::Differs => write!(f, "{stage}: differs in {differing} of {compared} items"),
             Verdict::Nothing => write!(f, "{stage}: no item was compared"),
         }
+    }
+}
+
+fn row_of_items(f: &mut fmt::Formatter<'_>, counts: &Counts) -> fmt::Result {
+    let (observed, compared) = (counts.observed, counts.compared);
+    write!(f, "items           {observed} seen, {compared} compared")?;
+    for (count, what) in [
+        (counts.opening, "only to begin with"),
+        (counts.skipped, "skipped since the shadow was behind"),
+        (counts.while_starting, "passed while it started"),
+        (counts.unanswered, "not answered"),
+        (counts.left, "left at the end"),
+    ] {
+        if count > 0 {
+            write!(f, ", {count} {what}")?;
+        }
+    }
+    match counts.missed {
+        0 => writeln!(f),
+        missed => writeln!(f, "; {missed} missed in {} gaps", counts.gaps),
     }
 }
 

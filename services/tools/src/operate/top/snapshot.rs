@@ -117,14 +117,12 @@ impl<'run> Snapshots<'run> {
         };
         let witnesses = WitnessCounts::of(motions());
         let basis = motions().next_back().map(|motion| motion.basis().name());
-        let in_flight = status
-            .published
-            .map(|published| published.saturating_sub(status.poses + status.dropped));
+        let done = status.poses + status.dropped;
+        let in_flight = status.published.map(|it| it.saturating_sub(done));
         self.draw(now, in_flight);
         let pids = status.processes.iter().map(|process| process.pid);
-        let usage: BTreeMap<u32, Usage> = pids
-            .filter_map(|pid| Some((pid, Usage::of(pid)?)))
-            .collect();
+        let usage = pids.filter_map(|pid| Some((pid, Usage::of(pid)?)));
+        let usage: BTreeMap<u32, Usage> = usage.collect();
         let current = (now, status.poses, usage.clone());
         let earlier = self.earlier.replace(current.clone());
         let (at, poses, before) = earlier.unwrap_or(current);

@@ -50,26 +50,17 @@ impl NavtechScans {
         options: &DatasetOptions,
         profile: Profile,
     ) -> Result<Self, OpenError> {
-        let Found {
-            format,
-            mut images,
-            mut notes,
-            ..
-        } = found;
+        let (format, mut images, mut notes) = (found.format, found.images, found.notes);
         check_shape(&images, format)?;
         let mut first_image = FirstImage::read(&mut images)?;
         let order = |image| row_order::order(&mut images, image);
-        let mut starts_ns = None;
+        let (mut starts_ns, mut meaning) = (None, profile.stamp_meaning);
         if let Some((starts, more)) = first_image.as_ref().and_then(order) {
             first_image = FirstImage::read(&mut images)?;
-            starts_ns = Some(starts);
+            (starts_ns, meaning) = (Some(starts), profile.scan_time.of_rows());
             notes.extend(more);
         }
         let named_by = first_image.as_ref().and_then(FirstImage::named_by);
-        let meaning = match starts_ns {
-            Some(_) => profile.scan_time.of_rows(),
-            None => profile.stamp_meaning,
-        };
         let mut scans = Self {
             properties: Properties {
                 limits: ScanLimits {

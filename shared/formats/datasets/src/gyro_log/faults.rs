@@ -25,6 +25,8 @@ pub(crate) const ABSURD_SHARE: f64 = 0.01;
 const GAP_PERIODS: f64 = 3.0 + 1e-6;
 
 const SPREAD: &str = "samples come in bursts of one stamp: spread evenly back to the burst before.";
+const REPEATED: &str = "samples have the stamp of a different sample: left out.";
+const OUT_OF_ORDER: &str = "samples come later than their stamps say: sorted.";
 const MEASURED_TWICE: &str = "samples are of times over which the clock was set back, and which have two measurements: left out.";
 
 /// Faults of a log. Its samples do not include the ones counted as left out.
@@ -100,14 +102,8 @@ impl LogFaults {
             (self.not_a_number, numbers.as_str()),
             (self.absurd, absurd.as_str()),
             (self.spread, SPREAD),
-            (
-                self.repeated,
-                "samples have the stamp of a different sample: left out.",
-            ),
-            (
-                self.out_of_order,
-                "samples come later than their stamps say: sorted.",
-            ),
+            (self.repeated, REPEATED),
+            (self.out_of_order, OUT_OF_ORDER),
             (self.measured_twice, MEASURED_TWICE),
         ];
         let counted = counted.into_iter().filter(|(count, _)| *count > 0);

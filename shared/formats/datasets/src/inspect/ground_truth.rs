@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use gyre_radar::{ClockOffset, MAX_OFFSET_S, clock_offset, median, trajectory::Trajectory};
 use serde_json::{Value, json};
 
 use super::Report;
-use crate::dataset::Dataset;
-use crate::ground_truth::{find_ground_truth, read_trajectory};
-use gyre_radar::median;
-use gyre_radar::trajectory::Trajectory;
-use gyre_radar::{ClockOffset, MAX_OFFSET_S, clock_offset};
+use crate::{
+    dataset::Dataset,
+    ground_truth::{find_ground_truth, read_trajectory},
+};
 
 /// Tolerance of the time span, ns: without decoding, times of scans are known to a few
 /// milliseconds.
@@ -76,36 +76,13 @@ fn examine_file(
     let nearest = nearest_s.map_or(String::new(), |s| {
         format!(", median distance of the nearest pose {:.1} ms", s * 1e3)
     });
-    let of_clock = match &clock {
-        Some(clock) if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.delay_s),
-        Some(clock) if clock.is_reliable() => format!(", clock {:+.2} s", clock.delay_s),
-        Some(_) => ", clock unknown".to_owned(),
-        None => String::new(),
-    };
+    let of_clock = clock.as_ref().map_or(String::new(), clock_in_words);
     report.line(
         "ground truth",
         format!("{name}: {poses} poses, {path_m:.1} m, {span}{covers}{nearest}{of_clock}"),
     );
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let scans = report.scans;
-    if !truth.has_heading() && poses > 1 {
-        report.find(format!("{name} has positions only, no headings."));
-    }
-    if poses > 1 && path_m < STANDING_M {
-        report.find(format!(
-            "{name} stands still: all its poses are in one place."
-        ));
-    }
-    if span_ns.is_none() {
-        report.find(format!(
-            "{name} has no times: poses can be compared by index only."
-        ));
-    }
-    if let Some(n) = covered.filter(|n| *n < scans) {
-        report.find(format!("{name} covers {n} of {scans} scans."));
-    }
-    let of_clock = clock.as_ref().and_then(|clock| clock_finding(clock, &name));
-    report.findings.extend(of_clock);
+    let found = findings(file, &truth, covered, report.scans, clock.as_ref());
+    report.findings.extend(found);
     json!({
         "file": file,
         "error": null,
@@ -117,6 +94,38 @@ fn examine_file(
         "nearest_pose_s": nearest_s,
         "clock": clock,
     })
+}
+
+fn clock_in_words(clock: &ClockOffset) -> String {
+    match clock.is_reliable() {
+        _ if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.delay_s),
+        true => format!(", clock {:+.2} s", clock.delay_s),
+        false => ", clock unknown".to_owned(),
+    }
+}
+
+fn findings(
+    file: &Path,
+    truth: &Trajectory,
+    covered: Option<usize>,
+    scans: usize,
+    clock: Option<&ClockOffset>,
+) -> impl Iterator<Item = String> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let lacks = |is_so: bool, what: &str| is_so.then(|| format!("{name} {what}."));
+    let (is_path, path_m) = (truth.len() > 1, truth.path_length_m());
+    let no_headings = "has positions only, no headings";
+    let stands = "stands still: all its poses are in one place";
+    let no_times = "has no times: poses can be compared by index only";
+    let partly = covered.filter(|n| *n < scans);
+    let findings = [
+        lacks(is_path && !truth.has_heading(), no_headings),
+        lacks(is_path && path_m < STANDING_M, stands),
+        lacks(truth.span_ns().is_none(), no_times),
+        partly.map(|n| format!("{name} covers {n} of {scans} scans.")),
+        clock.and_then(|clock| clock_finding(clock, &name)),
+    ];
+    findings.into_iter().flatten()
 }
 
 fn clock_finding(clock: &ClockOffset, name: &str) -> Option<String> {

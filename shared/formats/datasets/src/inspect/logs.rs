@@ -1,6 +1,6 @@
 //! The logs of gyro, wheels and GNSS: their content, rates, spans and faults.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_radar::median;
@@ -110,21 +110,8 @@ fn gnss(
     topic: Option<&str>,
     timing: Option<&Timing>,
 ) {
-    let root = report.root.clone();
-    let (file, log) = match dataset.fixes(topic) {
-        Ok(None) => match GnssLog::find(&root) {
-            Ok(file) => (file.clone(), GnssLog::read(&file)),
-            Err(_) => return,
-        },
-        Ok(Some(fixes)) => (root.clone(), GnssLog::of(fixes, &root)),
-        Err(error) => (root, Err(error.into())),
-    };
-    let log = match log {
-        Ok(log) => log,
-        Err(error) => {
-            let words = ["gnss", "a GNSS receiver"];
-            return unusable(report, words, &file, &error.to_string());
-        }
+    let Some((file, log)) = gnss_log(report, dataset, topic) else {
+        return;
     };
     let times = Times::of(log.fixes.iter().map(|fix| fix.stamp_ns), timing);
     let first = log.fixes.first().map_or([0.0; 2], |fix| fix.east_north_m);
@@ -165,6 +152,26 @@ fn gnss(
         more["topic"] = json!(topic);
     }
     report.figure("gnss", times.figures(&file, more));
+}
+
+/// Returns the log in the recording or beside it; reports one that cannot be used.
+fn gnss_log(
+    report: &mut Report,
+    dataset: &mut dyn Dataset,
+    topic: Option<&str>,
+) -> Option<(PathBuf, GnssLog)> {
+    let root = report.root.clone();
+    let (file, log) = match dataset.fixes(topic) {
+        Ok(None) => {
+            let file = GnssLog::find(&root).ok()?;
+            (file.clone(), GnssLog::read(&file))
+        }
+        Ok(Some(fixes)) => (root.clone(), GnssLog::of(fixes, &root)),
+        Err(error) => (root, Err(error.into())),
+    };
+    let words = ["gnss", "a GNSS receiver"];
+    let log = log.map_err(|error| unusable(report, words, &file, &error.to_string()));
+    Some((file, log.ok()?))
 }
 
 fn unusable(report: &mut Report, [section, of]: [&str; 2], file: &Path, error: &str) {

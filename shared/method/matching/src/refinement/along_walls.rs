@@ -24,6 +24,17 @@ pub(super) struct Match {
     pub leaves_map: bool,
 }
 
+impl Match {
+    fn of(registered: UncertainMotion, undetermined: Option<UnitVector2<f64>>) -> Self {
+        Self {
+            registered,
+            undetermined,
+            ahead_m: Vector2::zeros(),
+            leaves_map: false,
+        }
+    }
+}
+
 impl Refiner {
     /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
     /// plausible. In an undetermined direction the place is the predicted one, or the mean of
@@ -37,12 +48,7 @@ impl Refiner {
         let registered = self.registered(&best.alignment)?;
         let along = self.undetermined(scan, &best.alignment, &registered);
         let Some(along) = along.filter(|_| best.fits) else {
-            return best.is_plausible.then_some(Match {
-                registered,
-                undetermined: None,
-                ahead_m: Vector2::zeros(),
-                leaves_map: false,
-            });
+            return best.is_plausible.then_some(Match::of(registered, None));
         };
         self.match_across(scan, best, along, uncertainty)
     }
@@ -77,12 +83,7 @@ impl Refiner {
         }
         let registered = self.registered(&across.alignment)?;
         *best = across;
-        let mut found = Match {
-            registered,
-            undetermined: Some(along),
-            ahead_m: Vector2::zeros(),
-            leaves_map: false,
-        };
+        let mut found = Match::of(registered, Some(along));
         if is_guessed && !is_searched {
             found.ahead_m = ahead_to(searched, &registered.motion);
             let mut place = registered.motion;

@@ -133,19 +133,13 @@ fn bursts_are_found_wherever_they_are_and_counted_where_they_are_not() {
         &[[0, MAX_LOST + 1]],
     ];
     for bursts in bursts {
-        let lost = bursts
-            .iter()
-            .flat_map(|[first, count]| *first..first + count);
-        let lost = Vec::from_iter(lost);
+        let lost = Vec::from_iter(bursts.iter().flat_map(|[at, count]| *at..at + count));
         let mut now = whole.clone();
         lose(&mut now, &before, &lost);
         let mut finder = LostAzimuthFinder::default();
         finder.set_previous(&before.view(), &LostAzimuths::default());
         let unknown = finder.clone().find(&now.view(), None);
-        assert_eq!(
-            (unknown.count(), unknown.unplaced()),
-            (lost.len(), lost.len())
-        );
+        assert_eq!([unknown.count(), unknown.unplaced()], [lost.len(); 2]);
         // The rows behind are turned by all of them or by none: evenly distributed.
         let sigma_steps = unknown.variance_of_mean_rad2(AZIMUTHS).sqrt() / TAU as f32 * 400.0;
         let share = sigma_steps / lost.len() as f32;

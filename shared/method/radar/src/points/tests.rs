@@ -64,13 +64,10 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint
             let here = power(azimuth, cell);
             let rivals = (0..geometry.azimuths)
                 .filter(|&other| measured(other) && within_beam(azimuth, other));
-            let suppressed = rivals
-                .map(|other| power(other, cell))
-                .any(|there| there > here);
-            if here == 0
-                || suppressed
-                || !(config.min_range_m..=config.max_range_m).contains(&range_m)
-            {
+            let mut rivals = rivals.map(|other| power(other, cell));
+            let suppressed = rivals.any(|there| there > here);
+            let is_within = (config.min_range_m..=config.max_range_m).contains(&range_m);
+            if here == 0 || suppressed || !is_within {
                 continue;
             }
             let (sin, cos) = view.azimuth_rad[azimuth].sin_cos();
@@ -174,6 +171,19 @@ fn place(point: &SparsePoint, twist: &Twist) -> Point2<f64> {
     twist.pose_at(time_s) * Point2::from(Vector2::new(x, y) + direction * shift_m)
 }
 
+/// Returns the mean miss of the points near a scatterer.
+fn miss(points: &[SparsePoint], scatterer: &Point2<f64>, twist: &Twist) -> Vector2<f64> {
+    let (mut sum, mut moment) = (0.0, Vector2::zeros());
+    for point in points {
+        let (miss, weight) = (place(point, twist) - scatterer, f64::from(point.weight));
+        if miss.norm() < 4.0 {
+            sum += weight;
+            moment += miss * weight;
+        }
+    }
+    moment / sum
+}
+
 #[test]
 fn compensated_points_of_a_moving_sensor_are_at_the_scatterers() {
     let twist = Twist {
@@ -208,16 +218,8 @@ fn compensated_points_of_a_moving_sensor_are_at_the_scatterers() {
         };
         let points = extract(&all, &sensor.measure(&scatterers, 0.5), 30);
         for scatterer in &scatterers {
-            let (mut sum, mut moment) = (0.0, Vector2::zeros());
-            for point in &points {
-                let (miss, weight) = (place(point, &twist) - scatterer, f64::from(point.weight));
-                if miss.norm() < 4.0 {
-                    sum += weight;
-                    moment += miss * weight;
-                }
-            }
+            let (miss, range_m) = (miss(&points, scatterer, &twist), scatterer.coords.norm());
             // The accuracy is half an azimuth in bearing, and a tenth of a cell in range.
-            let (miss, range_m) = (moment / sum, scatterer.coords.norm());
             let along_m = miss.dot(&scatterer.coords).abs() / range_m;
             let most_m = 0.05 + 0.5 * 0.9_f64.to_radians() * range_m;
             assert!(

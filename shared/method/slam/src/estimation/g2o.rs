@@ -49,25 +49,7 @@ impl G2o {
                     poses.push(pose(x, y, yaw));
                 }
                 Some("EDGE_SE2") => {
-                    let needed = "EDGE_SE2 needs two ids, x, y, yaw and the six values of the upper triangle of the information matrix";
-                    let ([from, to], [x, y, yaw, information @ ..]) =
-                        fields::<2, 9>(words, needed).map_err(at)?;
-                    if from.max(to) >= poses.len() {
-                        let missing = from.max(to);
-                        return Err(at(format!("vertex {missing} is not in the file")));
-                    }
-                    let Some(factor) = unpack(&information).cholesky() else {
-                        return Err(at(format!(
-                            "the information matrix of the edge from {from} to {to} is not positive definite"
-                        )));
-                    };
-                    let motion = pose(x, y, yaw);
-                    let covariance = factor.inverse();
-                    let axes = axes(&motion);
-                    let motion = UncertainMotion {
-                        motion,
-                        covariance: axes * covariance * axes.transpose(),
-                    };
+                    let ([from, to], motion) = edge(words, poses.len()).map_err(at)?;
                     match from == odometry.len() && to == from + 1 {
                         true => odometry.push(Constraint::odometry(from, motion)),
                         false => loops.push(Constraint::closing(from, to, motion)),
@@ -133,6 +115,26 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
 /// along the axes of `from`.
 fn axes(motion: &Pose) -> Matrix3<f64> {
     motion.rotation.to_rotation_matrix().to_homogeneous()
+}
+
+/// Returns the ends and the motion of an edge between so many vertices.
+fn edge<'a>(
+    words: impl Iterator<Item = &'a str>,
+    vertices: usize,
+) -> Result<([usize; 2], UncertainMotion), String> {
+    let needed = "EDGE_SE2 needs two ids, x, y, yaw and the six values of the upper triangle of the information matrix";
+    let ([from, to], [x, y, yaw, information @ ..]) = fields::<2, 9>(words, needed)?;
+    let later = from.max(to);
+    if later >= vertices {
+        return Err(format!("vertex {later} is not in the file"));
+    }
+    let factor = unpack(&information).cholesky().ok_or_else(|| {
+        format!("the information matrix of the edge from {from} to {to} is not positive definite")
+    })?;
+    let (motion, covariance) = (pose(x, y, yaw), factor.inverse());
+    let axes = axes(&motion);
+    let covariance = axes * covariance * axes.transpose();
+    Ok(([from, to], UncertainMotion { motion, covariance }))
 }
 
 /// Returns ids and numbers; the error names `needed`.

@@ -176,11 +176,8 @@ fn a_geotiff_has_the_cells_and_their_place_on_the_earth() {
         let mut decoder = Decoder::new(Cursor::new(fs::read(&path).unwrap())).unwrap();
         let (width, height) = decoder.dimensions().unwrap();
         let keys = decoder.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap();
-        let code = keys
-            .chunks_exact(4)
-            .find(|key| key[0] == 3072)
-            .map(|key| key[3]);
-        assert_eq!(code, epsg);
+        let code = keys.chunks_exact(4).find(|key| key[0] == 3072);
+        assert_eq!(code.map(|key| key[3]), epsg);
         let bands = decoder.get_tag_ascii_string(Tag::Unknown(42_112)).unwrap();
         assert!(bands.contains(">evidence<") && bands.contains(">looked<"));
         let matrix = decoder
@@ -198,10 +195,8 @@ fn a_geotiff_has_the_cells_and_their_place_on_the_earth() {
             f64::from(height) - (20.1 - corner.y) / 0.2,
         );
         let evidence = pixels[2 * (row as usize * width as usize + column as usize)];
-        assert_eq!(
-            evidence,
-            cell(&mut drawn(&drive(20, &wall())), 0.1, 20.1).evidence
-        );
+        let expected = cell(&mut drawn(&drive(20, &wall())), 0.1, 20.1);
+        assert_eq!(evidence, expected.evidence);
         let east = matrix[0] * column + matrix[1] * row + matrix[3];
         let north = matrix[4] * column + matrix[5] * row + matrix[7];
         match origin {
@@ -211,11 +206,8 @@ fn a_geotiff_has_the_cells_and_their_place_on_the_earth() {
             Some(_) => {
                 let (northing, easting, _) = utm::to_utm_wgs84(51.75, -1.25, 30);
                 assert!((east - easting).abs() < 0.7, "{}", east - easting);
-                assert!(
-                    (north - northing - 20.1).abs() < 0.1,
-                    "{}",
-                    north - northing
-                );
+                let left_m = north - northing;
+                assert!((left_m - 20.1).abs() < 0.1, "{left_m}");
             }
         }
     }

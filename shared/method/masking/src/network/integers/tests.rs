@@ -44,17 +44,18 @@ fn at(image: &Image, channel: usize, row: i64, column: i64) -> i64 {
     }
 }
 
+/// All rows and columns.
+fn places(rows: i64, columns: i64) -> impl Iterator<Item = (i64, i64)> {
+    (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)))
+}
+
 #[test]
 fn a_convolution_is_the_direct_sum() {
     let mut numbers = Numbers(1);
     for [inputs, outputs, rows, columns] in [[3, 8, 5, 8], [16, 16, 4, 21], [2, 24, 9, 64]] {
         let from = numbers.image([inputs, rows, columns]);
-        let weights: Vec<i64> = (0..outputs * inputs * 9)
-            .map(|_| numbers.next(256) - 128)
-            .collect();
-        let offsets: Vec<i64> = (0..outputs)
-            .map(|_| numbers.next(20_000) - 10_000)
-            .collect();
+        let weights = Vec::from_iter((0..outputs * inputs * 9).map(|_| numbers.next(256) - 128));
+        let offsets = Vec::from_iter((0..outputs).map(|_| numbers.next(20_000) - 10_000));
         let mut kernel = Kernel {
             weights: vec![[[0.0; OUTPUTS]; 9]; outputs / OUTPUTS * inputs],
             offsets: offsets.iter().map(|offset| *offset as f32).collect(),
@@ -66,7 +67,6 @@ fn a_convolution_is_the_direct_sum() {
             let block = &mut kernel.weights[output / OUTPUTS * inputs + input];
             block[tap][output % OUTPUTS] = *weight as f32;
         }
-        // A direct sum.
         let expected = |output: usize, row: i64, column: i64| {
             let mut sum = offsets[output];
             for input in 0..inputs {
@@ -75,8 +75,7 @@ fn a_convolution_is_the_direct_sum() {
                     sum += value * weights[(output * inputs + input) * 9 + tap as usize];
                 }
             }
-            let expected = (sum as f64 / 1024.0).round_ties_even() as i64 + 100;
-            expected.clamp(0, 255)
+            ((sum as f64 / 1024.0).round_ties_even() as i64 + 100).clamp(0, 255)
         };
         // The widest vector unit of this processor, and the narrowest that there is.
         for is_widest in [true, false] {
@@ -91,15 +90,10 @@ fn a_convolution_is_the_direct_sum() {
                 false => convolution.eval(GenericIsa::new()),
             }
             for output in 0..outputs {
-                for (row, column) in
-                    (0..rows as i64).flat_map(|y| (0..columns as i64).map(move |x| (y, x)))
-                {
+                for (row, column) in places(rows as i64, columns as i64) {
+                    let expected = expected(output, row, column);
                     let value = at(&to, output, row, column);
-                    assert_eq!(
-                        value,
-                        expected(output, row, column),
-                        "{output} {row} {column}"
-                    );
+                    assert_eq!(value, expected, "{output} {row} {column}");
                 }
             }
         }
@@ -120,7 +114,7 @@ fn images_are_enlarged_between_the_centres_and_pooled_to_the_highest() {
         [(near, 3), (far.clamp(0, size - 1), 1)]
     };
     for channel in 0..3 {
-        for (row, column) in (0..12).flat_map(|y| (0..20).map(move |x| (y, x))) {
+        for (row, column) in places(12, 20) {
             let of_rows = beside(row, 6).into_iter();
             let weighed = of_rows.flat_map(|(y, down)| {
                 let from = &from;
@@ -130,7 +124,7 @@ fn images_are_enlarged_between_the_centres_and_pooled_to_the_highest() {
             let expected = (weighed.sum::<i64>() as f64 / 16.0).round_ties_even() as i64;
             assert_eq!(at(&large, channel, row, column), expected, "{row} {column}");
         }
-        for (row, column) in (0..3).flat_map(|y| (0..5).map(move |x| (y, x))) {
+        for (row, column) in places(3, 5) {
             let of_block = (0..4).map(|i| at(&from, channel, 2 * row + i / 2, 2 * column + i % 2));
             assert_eq!(at(&small, channel, row, column), of_block.max().unwrap());
         }

@@ -174,11 +174,8 @@ impl PoseGraph {
     /// Puts the equations at the present poses into the system, and returns their right-hand side.
     fn linearise(&mut self, weights: Weights) -> Result<DVector<f64>, EstimationError> {
         self.prepare()?;
-        let shares: Vec<_> = self
-            .loops
-            .iter()
-            .map(|closing| self.share(closing))
-            .collect();
+        let shares = self.loops.iter().map(|closing| self.share(closing));
+        let shares = Vec::from_iter(shares);
         let Self {
             system: Some(system),
             state: State { poses, frame },
@@ -216,13 +213,8 @@ impl PoseGraph {
             }
             let number = odometry.len() + loops.len() + number;
             let weight = measured.share() * measured.weight;
-            system.add(
-                number,
-                measured.ends(poses.len()),
-                &linear,
-                weight,
-                &mut side,
-            );
+            let ends = measured.ends(poses.len());
+            system.add(number, ends, &linear, weight, &mut side);
         }
         Ok(side)
     }
