@@ -14,7 +14,7 @@ use gyre_configuration::{
     terminal::{Failure, INTERRUPTED, execute_again, own, print},
     with_stored_options,
 };
-use gyre_contract::run::Ending;
+use gyre_contract::run::{Ending, Report};
 use gyre_datasets::GnssLog;
 use gyre_geometry::samples::GnssKind;
 use gyre_recording::{copied_fixes, received_fixes};

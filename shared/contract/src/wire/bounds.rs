@@ -169,7 +169,7 @@ impl Display for Expected<'_> {
             (Bounds::Within(first, last), _) => write!(f, "from {first} to {last}"),
             (Bounds::AtLeast(least), _) => write!(f, "{least} or more"),
             (Bounds::Codes(names), _) => write!(f, "0 to {}", names.len() - 1),
-            (Bounds::Bits(all), _) => write!(f, "bits of 1 to {}", (all + 1) / 2),
+            (Bounds::Bits(all), _) => write!(f, "bits of 1 to {}", all.div_ceil(2)),
             (Bounds::HalfTurn, _) => write!(f, "within half a turn"),
             (Bounds::Widths(widths), Some(limits)) => {
                 let reach_m = widths * limits.extent_m();
