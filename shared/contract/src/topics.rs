@@ -24,7 +24,10 @@ const OTHER_PAGES: usize = 32;
 const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
-/// Defines the messages, in the order of the stream.
+/// Defines the messages, in the order of the stream: header and element of the payload, sender,
+/// readers, how far its history reaches ([`History`]), and what observers do with it ([`Use`]).
+/// Queues follow from history and readers; `sizes` changes them. The fields of a header are in the
+/// module of the header.
 macro_rules! topics {
     ($(
         $(#[doc = $doc:literal])+

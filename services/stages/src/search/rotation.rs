@@ -1,5 +1,6 @@
 //! The rotation-search stage: the rotation between consecutive scans from their magnitude spectra
-//! (Weston et al., Sec. III-C, step 1).
+//! (Weston et al., Sec. III-C, step 1). [`SequentialRotation`] is the library; this module gives it
+//! the rasters of `masked`, and writes its result to `rotation`.
 
 use gyre_contract::{Masked, Rotation, StageId, run::StageCounters};
 use gyre_matching::{RotationConfig, RotationMatch, SequentialRotation};
@@ -20,6 +21,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: RotationConfig = launch.section("rotation")?;
     let mut rotation = SequentialRotation::new(raster.n, &config).map_err(RunError::input)?;
+    // The search keeps the spectrum of the later scan for the next pair, so it needs the number of
+    // the scan. A turn measured by the gyro limits the angles that it tries.
     let search = move |input: &PairView<'_, Masked>| {
         let (seq, pair) = (input.current.item().seq, input.rasters()?);
         let turn = input.current.header().turn().map(|turn| turn.yaw_rad);
@@ -30,7 +33,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     run_with(launch, Box::new(search))
 }
 
-/// Runs the stage until SIGTERM with a search of your own.
+/// Runs the stage until SIGTERM with any search, also one of your own.
 pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, RunError> {
     stage::run(launch, &mut RotationStage { search })
 }

@@ -1,8 +1,7 @@
 //! Radar odometry in one process: the whole method on one page.
 //!
 //! [`Odometry::register`] is the method: compensate, rasterise, mask, rotate, translate, refine,
-//! compose. The processes of a run compose the same parts from [`gyre_masking`] and
-//! [`gyre_matching`], so their motions are the same bits.
+//! compose. The stages of a run consist of the same parts, so their motions are the same bits.
 //!
 //! # Frames and units
 //! As in [`gyre_geometry`]: x forward, y left, yaw counter-clockwise; m, rad, s.
@@ -35,17 +34,23 @@ pub use search::{DecoupledSearch, Search};
 pub struct Odometry {
     masker: Masker,
     search: Box<dyn Search>,
+    /// Has the map of the last keyframes; `None`: motions stay as searched.
     refiner: Option<Refiner>,
+    /// The velocities of earlier scans, for motion compensation.
     twists: LaggedTwists,
     gyro: Gyro,
     wheels: Wheels,
     doppler: Option<DopplerEstimator>,
+    /// The velocity of the last scan, measured by `doppler`.
     velocity: Option<Result<DopplerVelocity, NoDoppler>>,
     min_range_m: f32,
     finder: LostAzimuthFinder,
+    /// Where azimuths of the last scan were lost, and a buffer for its rows at their bearings.
     lost: LostAzimuths,
     rows: PlacedRows,
+    /// The scan that is being registered, and the one before it.
     pair: Pair,
+    /// All motions so far: the pose in the frame of the first scan.
     driven: ComposedMotion,
 }
 
@@ -56,8 +61,8 @@ impl Odometry {
         Ok(Self::with_parts(config, Parts::new(config)?))
     }
 
-    /// Composes odometry of given parts. Of the configuration count the size of the rasters, the
-    /// number of points, and the lag of motion compensation.
+    /// Composes odometry of given parts, for a mask or a search of your own. The settings of these
+    /// parts in the configuration have no effect.
     pub fn with_parts(config: &OdometryConfig, parts: Parts) -> Self {
         let (n, capacity) = (config.raster.n, config.points.capacity);
         Self {
@@ -83,8 +88,8 @@ impl Odometry {
     /// starts a new chain as after [`Odometry::restart`].
     ///
     /// `samples` are the gyro's and the wheels' samples that come with the scan
-    /// ([`gyre_geometry::samples::interval_of`]), in the order of [`Sample::order`]; empty for radar alone. A
-    /// scan that fails is skipped: the next scan is registered against the scan before it.
+    /// ([`gyre_geometry::samples::interval_of`]), in the order of [`Sample::order`]; empty for radar
+    /// alone. A scan that fails is skipped: the next scan is registered against the scan before it.
     pub fn register(
         &mut self,
         scan: &PolarScan<'_>,
@@ -103,7 +108,7 @@ impl Odometry {
         let [_, rate] = self.gyro.sweep_rates_radps();
         let masked = self.mask(scan, with_yaw_rate(self.twists.next(), rate));
         if masked.is_err() {
-            // The next turn would be from the scan that is skipped.
+            // They would measure the next motion from the scan that is skipped.
             self.gyro.clear();
             self.wheels.clear();
         }
@@ -221,13 +226,13 @@ impl Odometry {
     }
 
     /// Returns the velocity of the radar by the Doppler shift of the last scan, or the reason for
-    /// its absence; `None` before the first one, and without `[doppler]`.
+    /// its absence; `None` before the first scan, and without `[doppler]`.
     pub fn doppler(&self) -> Option<&Result<DopplerVelocity, NoDoppler>> {
         self.velocity.as_ref()
     }
 
-    /// Returns where azimuths of the last scan were lost: [`PlacedRows`] puts its rows where they
-    /// were taken to be.
+    /// Returns where azimuths of the last scan were lost. [`PlacedRows`] puts the rows behind these
+    /// places to their estimated bearings.
     pub fn lost_azimuths(&self) -> LostAzimuths {
         self.lost
     }

@@ -1,5 +1,6 @@
 //! The inputs of a stage: pairs of consecutive items of one topic, alone or joined with another
-//! topic.
+//! topic. A [`Reader`] subscribes to one topic, checks its messages and leaves out duplicates: its
+//! head is the next item, and it keeps the item before.
 
 use gyre_contract::{Item, Masked, Message, Pair, flag};
 

@@ -1,4 +1,5 @@
-//! The loop of a stage between source and sink.
+//! The loop of a stage between source and sink: wait, take the inputs of the next item, process
+//! them, publish.
 
 use std::{thread, time::Duration};
 
@@ -20,7 +21,7 @@ use crate::{
 pub trait Stage {
     type Inputs: Inputs;
     type Output: Message;
-    /// The stage that it is, or replaces.
+    /// The stage that it is, or replaces; its time stamps in an item are the hop of this name.
     const HOP: gyre_contract::StageId;
 
     /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned
@@ -38,6 +39,7 @@ pub trait Stage {
 
 /// Runs a stage until SIGTERM.
 pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, RunError> {
+    // A program that stands by for a swap waits here until the process before it has ended.
     launch.take_place()?;
     let inputs = S::Inputs::open(launch)?;
     let output = Writer::open(&launch.node, &launch.manifest)?;
@@ -51,6 +53,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, Ru
         ended: false,
         counters: StageCounters::default(),
     };
+    // The history of the inputs may be in the queues already.
     flow.drain()?;
     loop {
         let woken = launch.signals.wait(
@@ -66,6 +69,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, Ru
         if woken.may_have_new_readers {
             flow.output.accept_readers()?;
         }
+        // Items without a wake-up: the transport has lost an event.
         if flow.drain()? && woken.timed_out {
             flow.counters.wakes_caught_late += 1;
         }
@@ -102,7 +106,7 @@ impl<S: Stage> Flow<'_, S> {
 
     fn process(&mut self, mut item: Item, received_ns: i64) -> Result<(), RunError> {
         self.require_next(&item)?;
-        // The slowest stage finds its queue full again and again, and never waits.
+        // A wait also writes the heartbeat, but the slowest stage always finds an item.
         self.signals.work_begins();
         let mut draft = self.output.loan()?;
         let missing = || RunError::transport("read the inputs of an item", item.seq);

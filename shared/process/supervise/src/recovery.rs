@@ -9,7 +9,7 @@ use crate::Plan;
 
 #[derive(Default)]
 pub(crate) struct Recovery {
-    /// Without a pose yet that the new process worked on.
+    /// Restarted stages, until the first pose that the new process has worked on.
     recovering: Vec<Recovering>,
     /// The time from each death to the first pose with work of the new process.
     pub times: Vec<Duration>,

@@ -1,5 +1,5 @@
-//! The loop of the supervisor. Its parts look at events and decide; `restarts` and `requests` carry
-//! out their decisions.
+//! The loop of the supervisor. Its parts look at events and decide. The modules `restarts` (as
+//! `recover`, `look_for_stalls`) and `requests` (as `serve`, `continue_swap`) carry out decisions.
 
 use std::{
     collections::BTreeMap,
@@ -54,7 +54,7 @@ pub fn supervise(
 
 pub(crate) struct Supervisor<'a> {
     pub processes: Processes,
-    /// No stage, and no follower.
+    /// An observer that the supervisor starts for `[record]`.
     pub recorder: Option<Recorder>,
     pub poses: Poses,
     pub recovery: Recovery,
@@ -131,9 +131,9 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// Waits until the followers have read the logs to their end, or until they have that do not
-    /// read what one writes that dies again and again. The stream has ended, so the death of a
-    /// stage changes nothing.
+    /// Waits until the followers have read the logs to their end. If a follower is given up because
+    /// it dies again and again, the followers behind it are not awaited: they read its log. The
+    /// stream has ended, so the death of a stage changes nothing.
     fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
         self.followers.are_awaited = true;
         // The last pose may have been the first of a program on trial.
@@ -214,7 +214,7 @@ impl<'a> Supervisor<'a> {
         }
         stopped?;
         log::bound_all(self.run.manifest());
-        // The failure that the run ends by is the first one.
+        // Without an ending the run has failed already, and reports that failure.
         match ending {
             Some(_) => self.processes.require_good_ends(&self.followers),
             None => Ok(()),
