@@ -25,9 +25,9 @@ const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
 /// Defines the messages, in the order of the stream: header and element of the payload, sender,
-/// readers, how far its history reaches ([`History`]), and what observers do with it ([`Use`]).
-/// Queues follow from history and readers; `sizes` changes them. The fields of a header are in the
-/// module of the header.
+/// readers, how far its history reaches, and what observers do with it ([`Use`]). The history
+/// `Stream` is one window of scans, `Feedback` two, `Latest` the last messages. Queues follow from
+/// history and readers; `sizes` changes them. The module of a header describes its fields.
 macro_rules! topics {
     ($(
         $(#[doc = $doc:literal])+

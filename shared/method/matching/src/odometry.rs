@@ -88,8 +88,9 @@ impl Odometry {
     /// starts a new chain as after [`Odometry::restart`].
     ///
     /// `samples` are the gyro's and the wheels' samples that come with the scan
-    /// ([`gyre_geometry::samples::interval_of`]), in the order of [`Sample::order`]; empty for radar
-    /// alone. A scan that fails is skipped: the next scan is registered against the scan before it.
+    /// ([`gyre_geometry::samples::interval_of`]), in the order of [`Sample::order`]; empty for
+    /// radar alone. A scan that fails is skipped: the next scan is registered against the scan
+    /// before it.
     pub fn register(
         &mut self,
         scan: &PolarScan<'_>,
@@ -105,6 +106,7 @@ impl Odometry {
         self.wheels.push(samples, stamp_ns, span_ns);
         self.pair.turn = self.gyro.turn();
         self.pair.distance = self.wheels.distance();
+        // The compensation needs a velocity before the search: an earlier one, turning as measured.
         let [_, rate] = self.gyro.sweep_rates_radps();
         let masked = self.mask(scan, with_yaw_rate(self.twists.next(), rate));
         if masked.is_err() {

@@ -66,6 +66,7 @@ pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, Ru
             flow.counters.duplicates = flow.inputs.duplicates();
             return Ok(flow.counters);
         }
+        // A new reader receives the history.
         if woken.may_have_new_readers {
             flow.output.accept_readers()?;
         }
