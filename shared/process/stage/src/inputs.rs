@@ -32,8 +32,8 @@ pub trait Inputs: Sized {
     /// Returns the inputs of the item of [`Action::Process`].
     fn view(&self) -> Option<Self::View<'_>>;
     fn advance(&mut self);
-    /// Returns the listeners to wait for after [`Action::Wait`]. If two inputs are missing, only the
-    /// later one is waited for: fewer wake-ups leave processor time to the stages before.
+    /// Returns the listeners to wait for after [`Action::Wait`]. If two inputs are missing, only
+    /// the later one is waited for: fewer wake-ups leave processor time to the stages before.
     fn listeners(&self) -> Vec<&Listener>;
     /// Returns the number of items that were skipped because they had been received before.
     fn duplicates(&self) -> u64;
