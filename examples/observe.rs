@@ -14,7 +14,7 @@
 
 use std::{error::Error, path::PathBuf, time::Duration};
 
-use gyre_client::observer::{Next, ObservedRun};
+use gyre_client::{Next, Run};
 use gyre_contract::{Pose, Scan};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .nth(1)
         .ok_or("usage: observe OUT, the folder of a run's results")?
         .into();
-    let run = ObservedRun::writing_to(&out)?;
+    let run = Run::open(&out)?;
     // One observer a topic. Each has a queue of its own, which loses its oldest message when it is
     // full.
     let mut scans = run.observe::<Scan>()?;

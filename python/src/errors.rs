@@ -28,6 +28,7 @@ exception!(read, "ReadError");
 exception!(write, "WriteError");
 exception!(scan, "ScanError");
 exception!(trajectory, "TrajectoryError");
+exception!(run, "RunError");
 
 /// A recording that cannot be opened, or options that it cannot have.
 pub fn open(error: OpenError) -> PyErr {

@@ -2,7 +2,7 @@
 //! rasters and points as numpy arrays.
 //!
 //! Reading order: `config`, `dataset`, `scan` (whose memory is numpy's), `odometry` and
-//! `registered`, `masker`, `slam`, `trajectory`, `evaluation`; `errors` and `values` convert errors
+//! `registered`, `masker`, `slam`, `trajectory`, `evaluation`; `run`, for running runs; `errors` and `values` convert errors
 //! and values between Rust and Python. `package/` holds the part that is written in Python.
 //!
 //! The GIL is released while scans are decoded and computed. Each object of Rust that changes is
@@ -21,6 +21,7 @@ mod odometry;
 mod opened;
 mod pose;
 mod registered;
+mod run;
 mod scan;
 mod slam;
 mod trajectory;
@@ -44,6 +45,7 @@ mod _gyre {
         odometry::Odometry,
         pose::Pose,
         registered::Registered,
+        run::{Message, Messages, Run},
         scan::Scan,
         slam::{Loop, Slam},
         trajectory::Trajectory,

@@ -132,7 +132,7 @@ static BREACHES: [(&str, &str, &str, &str); 17] = [
     (SEARCH, "swallows", "refuses-malformed", "on `masked` with an unknown flag"),
     (SEARCH, "stamps nothing", "stamps-work", "item 0: received_ns of its own hop is 0"),
     (SEARCH, "forgets the item", "copies-item", "stamp_ns differs from the input"),
-    (SEARCH, "sends NaN", "sends-valid", "read by any stage: angle_rad is NaN"),
+    (SEARCH, "sends NaN", "sends-valid", "read by any stage: rotation.angle_rad is NaN"),
     (SEARCH, "needs the first item", "looks-back", "it came to no item and not to item 8"),
     (SEARCH, "hangs", "stops-on-request", "of SIGTERM in the middle of the stream"),
     (SEARCH, "does not wait", "stands-by", "before its standard input ends"),

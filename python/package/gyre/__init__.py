@@ -9,6 +9,11 @@
         print(registered.motion, registered.pose)
     odometry.trajectory.write_tum("trajectory.tum")
 
+The poses of a run of processes, while it runs:
+
+    for pose in gyre.Run("out/demo").poses():
+        print(pose.stamp_ns, pose.x_m, pose.covariance)
+
 Frames are those of REP-103: x forward, y left, yaw counter-clockwise; lengths in m, angles in rad, times in ns.
 """
 
@@ -19,10 +24,13 @@ from ._gyre import (
     Loop,
     Masked,
     Masker,
+    Message,
+    Messages,
     Odometry,
     Pose,
     Registered,
     Report,
+    Run,
     Scan,
     Slam,
     Trajectory,
@@ -32,7 +40,7 @@ from ._gyre import (
     inspect,
     open,
 )
-from .errors import ConfigError, Error, ReadError, ScanError, SkippedScanWarning, TrajectoryError, WriteError
+from .errors import ConfigError, Error, ReadError, RunError, ScanError, SkippedScanWarning, TrajectoryError, WriteError
 from .objects import read_objects
 
 __all__ = [
@@ -44,11 +52,15 @@ __all__ = [
     "Loop",
     "Masked",
     "Masker",
+    "Message",
+    "Messages",
     "Odometry",
     "Pose",
     "ReadError",
     "Registered",
     "Report",
+    "Run",
+    "RunError",
     "Scan",
     "ScanError",
     "SkippedScanWarning",

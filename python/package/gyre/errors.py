@@ -25,5 +25,9 @@ class TrajectoryError(Error, ValueError):
     """Trajectories that cannot be compared or drawn."""
 
 
+class RunError(Error):
+    """A run that is not running, has no such topic or process, or does not answer."""
+
+
 class SkippedScanWarning(UserWarning):
     """A scan of a recording is damaged and was skipped."""

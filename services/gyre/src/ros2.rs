@@ -2,7 +2,7 @@
 
 use std::{path::Path, process::ExitCode};
 
-use gyre_client::observer::ObservedRun;
+use gyre_client::Run;
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
@@ -22,7 +22,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     // A wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
-        ObservedRun::writing_to(&run)?;
+        Run::open(&run)?;
     }
     let domain = Domain::new(arguments.domain, arguments.interface.as_deref())?;
     let bridge = Bridge::open(Settings {

@@ -4,7 +4,7 @@
 use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
-use gyre_client::{control::Control, observer::ObservedRun};
+use gyre_client::{Run, control::Control};
 use gyre_configuration::terminal::{Failure, own, print, seconds, words};
 use gyre_contract::{
     FollowerId, Footprint, StageId, Window,
@@ -64,7 +64,7 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let _locked = report.transpose()?;
     let control = chosen(&arguments.run)?;
     require_stage(&control, stage)?;
-    let run = ObservedRun::writing_to(control.out())?;
+    let run = Run::open(control.out())?;
     let manifest = run.manifest();
     let window = Window {
         observers: 0,

@@ -3,7 +3,7 @@
 use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_client::observer::ObservedRun;
+use gyre_client::Run;
 use gyre_configuration::terminal::{Failure, print};
 use gyre_results::absolute;
 use gyre_tools::operate::RunChoice;
@@ -38,7 +38,7 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     // Before the server starts, so that a wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
-        ObservedRun::writing_to(&run)?;
+        Run::open(&run)?;
     }
     let token = token(arguments)?;
     let listen = |address: SocketAddr| {

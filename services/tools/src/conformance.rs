@@ -19,7 +19,7 @@ pub mod shadow;
 
 use std::{io, path::Path, time::Duration};
 
-use gyre_client::{RunError, wake::Signals};
+use gyre_client::{RunError, Signals};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::StageId;
 use gyre_supervise::{SuperviseError, rig::Rig};

@@ -5,7 +5,7 @@ mod server;
 
 use std::{process::ExitCode, time::Duration};
 
-use gyre_client::wake::Signals;
+use gyre_client::Signals;
 use gyre_configuration::{
     Configuration, Played,
     terminal::{Failure, inputs::Inputs, print},

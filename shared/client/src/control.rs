@@ -61,6 +61,20 @@ impl Control {
         runs
     }
 
+    /// Returns the control of the only run of this user.
+    pub fn only() -> Result<Self, RunError> {
+        let mut runs = Self::of_all();
+        if runs.len() > 1 {
+            let names = runs.iter().map(|run| run.out.display().to_string());
+            let names = names.collect::<Vec<_>>().join(", ");
+            return Err(RunError::Input(format!(
+                "several runs are running: name one of {names}"
+            )));
+        }
+        let none = "no run is running: `gyre up` or `gyre run` starts one";
+        runs.pop().ok_or_else(|| RunError::Input(none.to_owned()))
+    }
+
     #[must_use]
     pub fn out(&self) -> &Path {
         &self.out

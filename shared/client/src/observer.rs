@@ -9,13 +9,17 @@ mod tests;
 
 use std::{
     fs::File,
+    ops::Deref,
     path::Path,
-    process, thread,
+    process,
+    rc::Rc,
+    thread,
     time::{Duration, Instant},
 };
 
-use gyre_contract::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
+use gyre_contract::{self as contract, GivenAnew, Item, NumberedBy, Sender, Topic};
 
+use crate::control::Control;
 use gyre_transport::{
     AnyMessage, Listener, Manifest, RecordedMessage, RunError, generation,
     heartbeat::HeartbeatWriter,
@@ -43,16 +47,19 @@ const REST: Duration = Duration::from_millis(10);
 const MISSED: &str = "recorder.missed";
 const RETRY: Duration = Duration::from_millis(100);
 
-/// A running run, seen from outside.
-pub struct ObservedRun {
+/// A running run, seen from outside. A clone is the same run.
+#[derive(Clone)]
+pub struct Run(Rc<Attached>);
+
+struct Attached {
     manifest: Manifest,
     /// The manifest's file. The run has ended when it is deleted.
     file: File,
     node: Node,
 }
 
-pub struct Observer<'run, M> {
-    run: &'run ObservedRun,
+pub struct Observer<M> {
+    run: Run,
     port: Port<M>,
     current: Option<Received<M>>,
     sequence: Sequence,
@@ -60,10 +67,12 @@ pub struct Observer<'run, M> {
     /// masking may still be killed, and reuse numbers.
     has_ended: bool,
     looked: Instant,
+    /// Shared with the message that [`Messages`] has returned.
+    held: Rc<()>,
 }
 
 /// An observer of a topic that is known by its name, whose messages are taken as bytes.
-pub type TopicObserver<'run> = Observer<'run, AnyMessage>;
+pub type TopicObserver = Observer<AnyMessage>;
 
 pub enum Next<'a, M> {
     /// A message, and the number of items that were missed directly before it. If masking was
@@ -74,9 +83,10 @@ pub enum Next<'a, M> {
     Ended,
 }
 
-impl ObservedRun {
+impl Run {
     /// Attaches to the run that writes its results to `out`.
-    pub fn writing_to(out: &Path) -> Result<Self, RunError> {
+    pub fn open(out: impl AsRef<Path>) -> Result<Self, RunError> {
+        let out = out.as_ref();
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         let root = run::root_of(&absolute);
         // A run that waits for its radar has none yet.
@@ -93,55 +103,65 @@ impl ObservedRun {
         let path = Manifest::path(root);
         let file = File::open(&path).map_err(RunError::file(&path))?;
         let node = manifest.transport()?.join(NAME)?;
-        let run = Self {
+        let run = Self(Rc::new(Attached {
             manifest,
             file,
             node,
-        };
+        }));
         match run.has_ended() {
-            true => Err(not_running(run.manifest.out)),
+            true => Err(not_running(run.manifest().out.clone())),
             false => Ok(run),
         }
     }
 
+    /// Attaches to the only run of this user.
+    pub fn only() -> Result<Self, RunError> {
+        Self::open(Control::only()?.out())
+    }
+
+    /// Returns what controls the run: its status, and requests to its supervisor.
+    pub fn control(&self) -> Result<Control, RunError> {
+        Control::of(&self.manifest().out)
+    }
+
     pub fn manifest(&self) -> &Manifest {
-        &self.manifest
+        &self.0.manifest
     }
 
     /// Informs the supervisor, which has started this process as its recorder under this name, that
     /// all topics are observed, and reports the waits for `signals` from here on.
     pub fn is_ready(&self, name: &str, signals: &Signals) -> Result<(), RunError> {
-        signals.report_to(HeartbeatWriter::create(&self.manifest, name)?);
-        run::write(run::ready_file(&self.manifest.root, name), "")
+        signals.report_to(HeartbeatWriter::create(&self.0.manifest, name)?);
+        run::write(run::ready_file(&self.0.manifest.root, name), "")
     }
 
     /// Reports to the supervisor how many messages its recorder, this process, has missed so far.
     pub fn tell_missed(&self, missed: u64) -> Result<(), RunError> {
-        let mut file = Numbers::open(&self.manifest, MISSED)?;
+        let mut file = Numbers::open(&self.0.manifest, MISSED)?;
         file.write([process::id().into(), missed])
     }
 
     pub fn has_ended(&self) -> bool {
-        rustix::fs::fstat(&self.file).is_ok_and(|file| file.st_nlink == 0)
+        rustix::fs::fstat(&self.0.file).is_ok_and(|file| file.st_nlink == 0)
     }
 
     /// Subscribes to a topic. The first messages come from the publisher's history.
-    pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, RunError> {
+    pub fn observe<M: contract::Message>(&self) -> Result<Observer<M>, RunError> {
         self.attach(M::ENTRY)
     }
 
     /// Subscribes to a topic whose messages are taken as bytes.
-    pub fn observe_topic(&self, topic: &'static Topic) -> Result<TopicObserver<'_>, RunError> {
+    pub fn observe_topic(&self, topic: &'static Topic) -> Result<TopicObserver, RunError> {
         self.attach(topic)
     }
 
-    fn attach<M>(&self, topic: &'static Topic) -> Result<Observer<'_, M>, RunError> {
+    fn attach<M>(&self, topic: &'static Topic) -> Result<Observer<M>, RunError> {
         if let Sender::Follower(follower) = topic.sender
-            && !follower.is_in(&self.manifest.window)
+            && !follower.is_in(&self.0.manifest.window)
         {
             return Err(RunError::Input(format!(
                 "the run that writes to {} has no topic `{}`: only a run with {} has it",
-                self.manifest.out.display(),
+                self.0.manifest.out.display(),
                 topic.name,
                 follower.needs()
             )));
@@ -151,20 +171,21 @@ impl ObservedRun {
             let failed = match self.try_attach(topic) {
                 Ok(port) => {
                     return Ok(Observer {
-                        run: self,
+                        run: self.clone(),
                         port,
                         current: None,
                         sequence: Sequence::default(),
                         has_ended: false,
                         looked: Instant::now(),
+                        held: Rc::default(),
                     });
                 }
                 Err(_) if self.has_ended() => {
-                    return Err(not_running(self.manifest.out.clone()));
+                    return Err(not_running(self.0.manifest.out.clone()));
                 }
                 Err(error) => error,
             };
-            if Instant::now() >= deadline || self.manifest.window.observers == 0 {
+            if Instant::now() >= deadline || self.0.manifest.window.observers == 0 {
                 return Err(failed);
             }
             thread::sleep(RETRY);
@@ -172,12 +193,12 @@ impl ObservedRun {
     }
 
     pub(crate) fn try_attach<M>(&self, topic: &'static Topic) -> Result<Port<M>, RunError> {
-        let places = self.manifest.window.observers;
+        let places = self.0.manifest.window.observers;
         let no_place = || RunError::NoPlace {
             topic: topic.name,
             observers: places,
         };
-        let service = Service::open(&self.node, topic)?;
+        let service = Service::open(&self.0.node, topic)?;
         if service.subscribers_named(NAME) >= places {
             return Err(no_place());
         }
@@ -187,8 +208,8 @@ impl ObservedRun {
         if service.subscribers_named(NAME) > places {
             return Err(no_place());
         }
-        let port = Port::of(subscriber, topic, &self.node, &self.manifest)?;
-        reader::notify_publisher(&self.node, topic.name)?;
+        let port = Port::of(subscriber, topic, &self.0.node, &self.0.manifest)?;
+        reader::notify_publisher(&self.0.node, topic.name)?;
         Ok(port)
     }
 }
@@ -203,10 +224,21 @@ pub fn read_missed(root: &Path, recorder: u32) -> u64 {
     }
 }
 
-impl<M> Observer<'_, M> {
+impl<M> Observer<M> {
     /// Returns the next message in the publisher's memory, and waits for it at most `limit`. The
     /// message before it is released, and the next call releases this one.
     pub fn next(&mut self, limit: Duration) -> Result<Next<'_, M>, RunError> {
+        let received = self.receive(limit)?;
+        Ok(match received {
+            Some((message, missed)) => Next::Message(self.current.insert(message), missed),
+            None if self.has_ended => Next::Ended,
+            None => Next::Idle,
+        })
+    }
+
+    /// Receives the next message, and the number of items that were missed directly before it.
+    /// `None` after `limit`, and at the end.
+    fn receive(&mut self, limit: Duration) -> Result<Option<(Received<M>, u64)>, RunError> {
         self.current = None;
         self.has_ended = false;
         let since = Instant::now();
@@ -215,19 +247,34 @@ impl<M> Observer<'_, M> {
                 let item = message.item();
                 let skipped = self.skipped(self.sequence.generation, item)?;
                 if let Some(missed) = self.sequence.advance_past(item, skipped) {
-                    return Ok(Next::Message(self.current.insert(message), missed));
+                    return Ok(Some((message, missed)));
                 }
             }
             self.has_ended = self.sequence.ended || self.run.has_ended();
-            if self.has_ended {
-                return Ok(Next::Ended);
-            }
             let left = limit.saturating_sub(since.elapsed());
-            if left.is_zero() {
-                return Ok(Next::Idle);
+            if self.has_ended || left.is_zero() {
+                return Ok(None);
             }
             self.sleep(left.min(wake::MAX_WAIT))?;
         }
+    }
+
+    /// Receives the next message to hold, and waits for it at most `limit`; `None` after that, and
+    /// at the end. One message is held at a time: another one before it is dropped is an error.
+    pub fn hold(&mut self, limit: Duration) -> Result<Option<Message<M>>, RunError> {
+        if Rc::strong_count(&self.held) > 1 {
+            return Err(RunError::Input(format!(
+                "a message of the topic `{}` is still held, and an observer holds one at a time: drop it, and copy what you keep of it",
+                self.topic()
+            )));
+        }
+        let held = Rc::clone(&self.held);
+        let received = self.receive(limit)?;
+        Ok(received.map(|(received, missed)| Message {
+            received,
+            missed,
+            held,
+        }))
     }
 
     /// Takes a copy of the next message that is there; `None` without a message. A message that
@@ -242,7 +289,7 @@ impl<M> Observer<'_, M> {
     /// Returns, among the generations after `known` and before the item's, the one that reused the
     /// smallest number.
     pub fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, RunError> {
-        let out = &self.run.manifest.out;
+        let out = &self.run.manifest().out;
         generation::skipped(out, NumberedBy::of(self.topic()), known, item)
     }
 
@@ -280,6 +327,53 @@ impl<M> Observer<'_, M> {
         thread::sleep(REST.saturating_sub(self.looked.elapsed()).min(left));
         self.looked = Instant::now();
         Ok(())
+    }
+}
+
+/// A message in the publisher's memory, held until it is dropped.
+pub struct Message<M> {
+    received: Received<M>,
+    /// Items that were missed directly before it.
+    pub missed: u64,
+    held: Rc<()>,
+}
+
+impl<M> Message<M> {
+    pub fn received(&self) -> &Received<M> {
+        &self.received
+    }
+
+    /// Returns what is alive as long as the message is held.
+    pub fn token(&self) -> Rc<()> {
+        Rc::clone(&self.held)
+    }
+}
+
+impl<M: contract::Message> Deref for Message<M> {
+    type Target = M::Header;
+
+    fn deref(&self) -> &M::Header {
+        self.received.header()
+    }
+}
+
+/// The messages of a topic until the end of the run. Each is dropped before the next one.
+pub struct Messages<M>(Observer<M>);
+
+impl<M> IntoIterator for Observer<M> {
+    type Item = Result<Message<M>, RunError>;
+    type IntoIter = Messages<M>;
+
+    fn into_iter(self) -> Messages<M> {
+        Messages(self)
+    }
+}
+
+impl<M> Iterator for Messages<M> {
+    type Item = Result<Message<M>, RunError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.0.hold(Duration::MAX).transpose()
     }
 }
 

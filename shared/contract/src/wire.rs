@@ -8,8 +8,7 @@ mod value;
 
 use bytemuck::Pod;
 
-use bounds::Number;
-pub use bounds::{Bounds, REACH};
+pub use bounds::{Bounds, Number, REACH};
 pub(crate) use bounds::{field, require};
 pub(crate) use codes::codes;
 pub use value::Value;

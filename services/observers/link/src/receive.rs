@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_client::{Manifest, RunError, log, wake::Signals};
+use gyre_client::{Manifest, RunError, Signals, log};
 use gyre_contract::{run::LinkConfig, topic};
 use gyre_journal::{self as journal, Journal};
 use gyre_supervise::rig::Rig;

@@ -14,11 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{
-    Manifest, RunError, log,
-    observer::{ObservedRun, TopicObserver, wait_for_any},
-    wake::{MAX_WAIT, Signals},
-};
+use gyre_client::{MAX_WAIT, Manifest, Run, RunError, Signals, TopicObserver, log, wait_for_any};
 use gyre_contract::{
     Limits, Loop, Message as _, Pose, Use, Window, composed, run::LinkConfig, topic, topic_named,
 };
@@ -109,7 +105,7 @@ pub fn send(
     linger: Duration,
 ) -> Result<Sent, RunError> {
     check(link)?;
-    let run = ObservedRun::writing_to(out)?;
+    let run = Run::open(out)?;
     let _log = log::start_log(run.manifest(), NAME)?;
     let signals = Signals::install()?;
     let pause = || signals.sleep(MAX_WAIT);
@@ -123,21 +119,21 @@ pub fn send(
 }
 
 struct Sending<'run> {
-    run: &'run ObservedRun,
-    topics: Vec<SentTopic<'run>>,
+    run: &'run Run,
+    topics: Vec<SentTopic>,
     _server: Server,
     _offer: Queryable<()>,
 }
 
-struct SentTopic<'run> {
-    observer: TopicObserver<'run>,
+struct SentTopic {
+    observer: TopicObserver,
     buffer: Arc<dyn ReplayBuffer>,
     offer: Arc<Offer>,
 }
 
 impl<'run> Sending<'run> {
     fn begin(
-        run: &'run ObservedRun,
+        run: &'run Run,
         link: &str,
         named: &[String],
         session: &Session,
@@ -213,7 +209,7 @@ impl<'run> Sending<'run> {
     }
 }
 
-impl SentTopic<'_> {
+impl SentTopic {
     fn take(&mut self) -> Result<(), RunError> {
         loop {
             match self.observer.take() {

@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use gyre_client::{RunError, clock, wake::Signals};
+use gyre_client::{RunError, Signals, clock};
 use gyre_ros2_messages::{diagnostic_msgs::DiagnosticArray, tf2_msgs::TFMessage};
 
 use crate::{

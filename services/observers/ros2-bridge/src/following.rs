@@ -2,10 +2,7 @@
 
 use std::thread;
 
-use gyre_client::{
-    Manifest, RunError,
-    observer::{Next, ObservedRun},
-};
+use gyre_client::{Manifest, Next, Run, RunError};
 use gyre_contract::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader};
 use gyre_ros2_messages::{
     nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
@@ -37,7 +34,7 @@ pub struct ObjectTopics {
 
 pub fn follow_runs(shared: &Shared, mut topics: Topics, say: fn(&str)) {
     while !shared.is_stopping() {
-        let Ok(run) = ObservedRun::writing_to(&shared.out) else {
+        let Ok(run) = Run::open(&shared.out) else {
             // There is no run yet.
             thread::sleep(POLL_INTERVAL);
             continue;
@@ -96,13 +93,9 @@ fn follow_run(shared: &Shared, manifest: &Manifest, topics: &mut Topics, say: fn
 
 /// Calls `follow` with the run of this name, again after a failure, and waits for the end of the
 /// run: until the results are written.
-fn until_end(
-    shared: &Shared,
-    name: &str,
-    mut follow: impl FnMut(&ObservedRun) -> Result<(), RunError>,
-) {
+fn until_end(shared: &Shared, name: &str, mut follow: impl FnMut(&Run) -> Result<(), RunError>) {
     while !shared.is_stopping() {
-        let followed = match ObservedRun::writing_to(&shared.out) {
+        let followed = match Run::open(&shared.out) {
             Ok(run) if run.manifest().prefix != name => return,
             Ok(run) => follow(&run).map(|()| await_end(shared, &run)),
             Err(error) => Err(error),
@@ -117,7 +110,7 @@ fn until_end(
     }
 }
 
-fn await_end(shared: &Shared, run: &ObservedRun) {
+fn await_end(shared: &Shared, run: &Run) {
     while !shared.is_stopping() && !run.has_ended() {
         thread::sleep(POLL_INTERVAL);
     }
@@ -125,7 +118,7 @@ fn await_end(shared: &Shared, run: &ObservedRun) {
 
 fn follow_poses(
     shared: &Shared,
-    run: &ObservedRun,
+    run: &Run,
     topics: &mut PoseTopics,
     say: fn(&str),
 ) -> Result<(), RunError> {
@@ -148,7 +141,7 @@ fn sentence(state: &RunState) -> String {
 /// stops.
 fn each_message<M: Message>(
     shared: &Shared,
-    run: &ObservedRun,
+    run: &Run,
     mut take: impl FnMut(&M::Header),
 ) -> Result<(), RunError> {
     let mut observer = run.observe::<M>()?;

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{clock, observer::ObservedRun};
+use gyre_client::{Run, clock};
 use gyre_geometry::Pose;
 use gyre_ros2_messages::{frames::occupancy_grid, nav_msgs::OccupancyGrid};
 use gyre_slam::{
@@ -46,7 +46,7 @@ pub struct MapTopic {
 
 impl MapTopic {
     /// Publishes the map of a run when it has new keyframes, until the run ends.
-    pub fn follow(&mut self, shared: &Shared, run: &ObservedRun) {
+    pub fn follow(&mut self, shared: &Shared, run: &Run) {
         let settings = (self.settings)(&shared.out).map_err(LiveMapError::from);
         let followed =
             settings.and_then(|settings| publish(shared, run, &settings, &mut self.maps));
@@ -59,7 +59,7 @@ impl MapTopic {
 
 fn publish(
     shared: &Shared,
-    run: &ObservedRun,
+    run: &Run,
     settings: &MapSettings,
     maps: &mut Outlet<OccupancyGrid>,
 ) -> Result<(), LiveMapError> {

@@ -8,10 +8,7 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws};
-use gyre_client::{
-    Received, RunError,
-    observer::{Next, ObservedRun},
-};
+use gyre_client::{Next, Received, Run, RunError};
 use gyre_contract::{Masked, Message, Objects, Pose, PoseHeader, Scan};
 
 use crate::{
@@ -61,7 +58,7 @@ pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
 
 fn follow_runs(followed: &Followed) {
     while !followed.view.is_stopping() {
-        match ObservedRun::writing_to(&followed.out) {
+        match Run::open(&followed.out) {
             Ok(run) => follow_run(followed, &run),
             // There is no run yet.
             Err(_) => thread::sleep(POLL_INTERVAL),
@@ -69,7 +66,7 @@ fn follow_runs(followed: &Followed) {
     }
 }
 
-fn follow_run(followed: &Followed, run: &ObservedRun) {
+fn follow_run(followed: &Followed, run: &Run) {
     let view = &followed.view;
     view.begin(run.manifest());
     let mut track = JournalTrack::of(&run.manifest().out);
@@ -97,11 +94,7 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
     }
 }
 
-fn follow_poses(
-    followed: &Followed,
-    run: &ObservedRun,
-    track: &mut JournalTrack,
-) -> Result<(), RunError> {
+fn follow_poses(followed: &Followed, run: &Run, track: &mut JournalTrack) -> Result<(), RunError> {
     let view = &followed.view;
     let mut poses = run.observe::<Pose>()?;
     // Without a place for it the rates are missing, and nothing else.
@@ -175,7 +168,7 @@ pub fn follow_topic<M: Message>(
     if !is_wanted() || followed.view.run().state != RunState::Working {
         return Ok(());
     }
-    let followed = ObservedRun::writing_to(&followed.out).and_then(|run| {
+    let followed = Run::open(&followed.out).and_then(|run| {
         let mut observer = run.observe::<M>()?;
         while is_wanted() {
             match observer.next(POLL_INTERVAL)? {

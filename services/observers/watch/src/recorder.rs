@@ -20,12 +20,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{
-    Manifest, RunError, clock, log,
-    observer::{ObservedRun, wait_for_any},
-    run,
-    wake::{MAX_WAIT, Signals},
-};
+use gyre_client::{MAX_WAIT, Manifest, Run, RunError, Signals, clock, log, run, wait_for_any};
 use gyre_contract::{Message, Pose, Use, topic, topic_named};
 use gyre_recording::{LogTail, Positions, SplitWriter};
 
@@ -77,8 +72,8 @@ impl fmt::Display for Recorded {
 pub fn record(options: &Options) -> Result<Recorded, RunError> {
     let run = match std::env::var_os(run::ENVIRONMENT) {
         // The supervisor's own: its root is the same for other names of the folder.
-        Some(root) if options.continues => ObservedRun::at(Path::new(&root))?,
-        _ => ObservedRun::writing_to(&options.out)?,
+        Some(root) if options.continues => Run::at(Path::new(&root))?,
+        _ => Run::open(&options.out)?,
     };
     let manifest = run.manifest();
     let _log = log::start_log(manifest, NAME)?;
@@ -137,11 +132,7 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RunError
     Ok(named.to_vec())
 }
 
-fn taps<'run>(
-    run: &'run ObservedRun,
-    topics: &[String],
-    earlier: Option<&Positions>,
-) -> Result<Vec<Tap<'run>>, RunError> {
+fn taps(run: &Run, topics: &[String], earlier: Option<&Positions>) -> Result<Vec<Tap>, RunError> {
     let tap = |name: &String| {
         // Recording begins with the first scan, which waits for the recorder.
         let expected = earlier.map(|it| it.get(name).copied().unwrap_or_default());
@@ -151,9 +142,9 @@ fn taps<'run>(
 }
 
 struct Recorder<'run> {
-    run: &'run ObservedRun,
+    run: &'run Run,
     signals: Signals,
-    taps: Vec<Tap<'run>>,
+    taps: Vec<Tap>,
     log: Option<LogTail>,
     health: Option<Receiver<String>>,
     queue: Sender,
@@ -171,7 +162,7 @@ impl Recorder<'_> {
             self.take_all()?;
             // As long as poses are to come, masking may be killed and may number its messages
             // again, even the end of the stream.
-            let is_last = |tap: &Tap<'_>| tap.counts().topic == Pose::TOPIC;
+            let is_last = |tap: &Tap| tap.counts().topic == Pose::TOPIC;
             let have_ended = self.taps.iter().any(is_last) && self.taps.iter().all(Tap::has_ended);
             if has_ended || have_ended || writing.is_finished() {
                 return Ok(());

@@ -17,7 +17,7 @@ use axum::{
     response::{IntoResponse, Redirect, Response},
     routing::get,
 };
-use gyre_client::wake::Signals;
+use gyre_client::Signals;
 use tokio::{
     runtime,
     sync::{Semaphore, watch},

@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_client::{RunError, last_line, wake::Signals};
+use gyre_client::{RunError, Signals, last_line};
 use gyre_configuration::terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 

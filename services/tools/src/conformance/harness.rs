@@ -3,7 +3,7 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
-use gyre_client::{Manifest, RunError, TopicWriter, wake::Signals};
+use gyre_client::{Manifest, RunError, Signals, TopicWriter};
 use gyre_configuration::terminal::own;
 use gyre_contract::{Item, Pose, PoseHeader, StageId, StageTopics, flag};
 use gyre_supervise::{

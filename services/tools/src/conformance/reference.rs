@@ -6,11 +6,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{RunError, TopicWriter, wake::Signals};
+use gyre_client::{RunError, Signals, TopicWriter};
 use gyre_configuration::terminal::{Failure, own};
-use gyre_contract::StageTopics;
 use gyre_contract::{
-    Item, Message, Motion, Pose, PoseHeader, StageId, compose, flag, run::StageConfig,
+    Item, Message, Motion, Pose, PoseHeader, StageId, StageTopics, compose, flag, run::StageConfig,
 };
 use gyre_supervise::rig::{Process, Recorded, Rig, Tap};
 

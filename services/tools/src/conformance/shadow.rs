@@ -14,7 +14,7 @@ mod shadowing;
 
 use std::{fs, path::PathBuf, time::Duration};
 
-use gyre_client::{Manifest, RunError, observer::ObservedRun, wake::Signals};
+use gyre_client::{Manifest, Run, RunError, Signals};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{StageId, Window};
 use gyre_supervise::Scheduling;
@@ -57,7 +57,7 @@ pub const STAGES: [StageId; 5] = [
 /// requests a stop. `observe` receives lines about the progress. Faults of the program are in the
 /// report, not in the error.
 pub fn shadow(
-    run: &ObservedRun,
+    run: &Run,
     options: &Options,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Report, Failure> {
@@ -91,7 +91,7 @@ pub fn shadow(
 
 /// Returns the program, in a run like the observed one but lossless: the scans that the run's
 /// masking has dropped are not sent at all.
-fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, RunError> {
+fn candidate(run: &Run, options: &Options) -> Result<Candidate, RunError> {
     let manifest = run.manifest();
     let configuration = manifest.root.join("config.toml");
     Ok(Candidate {

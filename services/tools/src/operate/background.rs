@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 
-use gyre_client::{control::Control, last_line, wake::Signals};
+use gyre_client::{Signals, control::Control, last_line};
 use gyre_configuration::terminal::{Failure, own, print};
 use gyre_contract::control::{Phase, Status};
 use gyre_results::SUMMARY;

@@ -29,7 +29,7 @@ pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
     if let Some(out) = &choice.run {
         return Ok(Control::of(out)?);
     }
-    let run = only_run()?;
+    let run = Control::only()?;
     name(&run);
     Ok(run)
 }
@@ -40,7 +40,7 @@ pub fn chosen_to_change(choice: &RunChoice) -> Result<Control, Failure> {
     if let Some(out) = &choice.run {
         return Ok(Control::of(out)?);
     }
-    let run = only_run()?;
+    let run = Control::only()?;
     let started_in = run.status()?.started_in;
     if env::current_dir().is_ok_and(|here| here == started_in) {
         name(&run);
@@ -55,15 +55,4 @@ pub fn chosen_to_change(choice: &RunChoice) -> Result<Control, Failure> {
 
 fn name(run: &Control) {
     print::note(format_args!("gyre: of the run in {}", run.out().display()));
-}
-
-fn only_run() -> Result<Control, Failure> {
-    let mut runs = Control::of_all();
-    if runs.len() > 1 {
-        let names = runs.iter().map(|run| run.out().display().to_string());
-        let names = names.collect::<Vec<_>>().join(", ");
-        return Err(format!("several runs are running: name one of {names}").into());
-    }
-    let none = "no run is running: `gyre up` or `gyre run` starts one";
-    Ok(runs.pop().ok_or(none)?)
 }

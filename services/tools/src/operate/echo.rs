@@ -8,10 +8,7 @@ use std::{
 };
 
 use clap::Args;
-use gyre_client::{
-    AnyMessage, Received,
-    observer::{Next, ObservedRun},
-};
+use gyre_client::{AnyMessage, Next, Received, Run};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Message, Pose, Topic};
 
@@ -59,7 +56,7 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
 }
 
 fn observe(out: &Path, topic: &'static Topic, json: bool) -> Result<(), Failure> {
-    let run = ObservedRun::writing_to(out)?;
+    let run = Run::open(out)?;
     let mut observer = run.observe_topic(topic)?;
     let mut lines = BufWriter::new(io::stdout().lock());
     let mut received = 0_u64;

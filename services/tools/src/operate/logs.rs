@@ -3,7 +3,7 @@
 use std::{path::Path, process::ExitCode, time::Duration};
 
 use clap::Args;
-use gyre_client::{control::Control, wake::Signals};
+use gyre_client::{Signals, control::Control};
 use gyre_configuration::{
     process_names,
     terminal::{Failure, print},

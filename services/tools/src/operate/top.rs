@@ -10,10 +10,7 @@ use std::{
 };
 
 use clap::Args;
-use gyre_client::{
-    observer::{ObservedRun, Observer},
-    wake::Signals,
-};
+use gyre_client::{Observer, Run, Signals};
 use gyre_configuration::terminal::{Failure, WIDTH, print};
 use ratatui::{
     DefaultTerminal,
@@ -45,7 +42,7 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
         .filter(|every| *every >= PERIOD)
         .ok_or("--every must be 0.05 s or more")?;
     let control = chosen(&arguments.run)?;
-    let run = ObservedRun::writing_to(control.out())?;
+    let run = Run::open(control.out())?;
     let poses = run.observe()?;
     // Without a place for it the rates are missing, and nothing else.
     let has_samples = run.manifest().limits.samples > 0;
@@ -82,7 +79,7 @@ fn width() -> u16 {
 /// Returns the last snapshot at a run that has ended; `None` if the person ended it.
 fn show(
     terminal: &mut DefaultTerminal,
-    snapshots: &mut Snapshots<'_>,
+    snapshots: &mut Snapshots,
     every: Duration,
 ) -> Result<Option<Snapshot>, Failure> {
     let mut last = None;
@@ -111,7 +108,7 @@ fn show(
 
 /// Takes the poses that come within `time`; true if `quit` returns true.
 fn wait(
-    snapshots: &mut Snapshots<'_>,
+    snapshots: &mut Snapshots,
     time: Duration,
     mut quit: impl FnMut() -> Result<bool, Failure>,
 ) -> Result<bool, Failure> {
@@ -125,5 +122,5 @@ fn wait(
     Ok(false)
 }
 
-type Poses<'run> = Observer<'run, gyre_contract::Pose>;
-type Scans<'run> = Observer<'run, gyre_contract::Scan>;
+type Poses = Observer<gyre_contract::Pose>;
+type Scans = Observer<gyre_contract::Scan>;

@@ -8,11 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{
-    memory,
-    observer::{ObservedRun, wait_for_any},
-    wake::{MAX_WAIT, Signals},
-};
+use gyre_client::{MAX_WAIT, Run, Signals, memory, wait_for_any};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::topics;
 
@@ -81,7 +77,7 @@ fn piece() -> Vec<u8> {
 
 /// Copies the messages of all topics of a run until it ends.
 pub(super) fn observe(out: &Path) -> Result<(), Failure> {
-    let (run, signals) = (ObservedRun::writing_to(out)?, Signals::install()?);
+    let (run, signals) = (Run::open(out)?, Signals::install()?);
     let observers = topics(&run.manifest().window).map(|topic| run.observe_topic(topic));
     let mut observers = observers.collect::<Result<Vec<_>, _>>()?;
     print::line(READY)?;

@@ -9,10 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{
-    RunError, clock,
-    observer::{Next, Observer},
-};
+use gyre_client::{Next, Observer, RunError, clock};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{
     Footprint, Pose, PoseHeader, StageId,
@@ -130,7 +127,7 @@ pub fn measure(
 
 fn await_others(
     held: &Weak<()>,
-    poses: &mut Observer<'_, Pose>,
+    poses: &mut Observer<Pose>,
     newest: &mut PoseHeader,
 ) -> Result<(), RunError> {
     loop {
@@ -146,7 +143,7 @@ fn await_others(
 
 /// Takes the poses that come within `limit`; true if the run has ended.
 fn drain(
-    poses: &mut Observer<'_, Pose>,
+    poses: &mut Observer<Pose>,
     mut limit: Duration,
     take: &mut dyn FnMut(&PoseHeader),
 ) -> Result<bool, RunError> {
@@ -206,7 +203,7 @@ impl Session {
     /// Measures until it is over; true if the run has ended before that.
     fn measure(
         &mut self,
-        poses: &mut Observer<'_, Pose>,
+        poses: &mut Observer<Pose>,
         mut has_ended: impl FnMut() -> bool,
     ) -> Result<bool, RunError> {
         while !self.is_over() {

@@ -11,15 +11,15 @@ use gyre_contract::{
 use gyre_transport::{
     RunError,
     reader::{Port, Received},
-    rig::{Run, WINDOW, node, reader, send, writer},
+    rig::{Run as Rig, WINDOW, node, reader, send, writer},
     run::{SHARED_MEMORY, own_files},
     transport::Service,
 };
 
-use super::{Next, ObservedRun, Observer};
+use super::{Next, Observer, Run};
 
 /// The sequence number of the next message, and the number of missed messages before it.
-fn next(observer: &mut Observer<'_, Pose>) -> Option<(u64, u64)> {
+fn next(observer: &mut Observer<Pose>) -> Option<(u64, u64)> {
     match observer.next(Duration::ZERO).unwrap() {
         Next::Message(message, missed) => Some((message.item().seq, missed)),
         Next::Idle | Next::Ended => None,
@@ -28,8 +28,8 @@ fn next(observer: &mut Observer<'_, Pose>) -> Option<(u64, u64)> {
 
 #[test]
 fn an_observer_counts_what_its_full_queue_lost() {
-    let run = Run::begin();
-    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let run = Rig::begin();
+    let observed = Run::at(&run.manifest.root).unwrap();
     let mut observer = observed.observe::<Pose>().unwrap();
     let poses = writer::<Pose>(&run.manifest);
     send(&poses, 0, 0);
@@ -47,13 +47,13 @@ fn an_observer_counts_what_its_full_queue_lost() {
 
 #[test]
 fn a_publisher_has_memory_left_whatever_its_subscribers_hold() {
-    let run = Run::begin();
+    let run = Rig::begin();
     let sizes = Pose::sizes(&WINDOW);
     let joined = node(&run.manifest);
     let readers: Vec<_> = (0..sizes.readers)
         .map(|_| Port::<Pose>::open(&joined, &run.manifest).unwrap())
         .collect();
-    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let observed = Run::at(&run.manifest.root).unwrap();
     let mut observers: Vec<_> = (0..sizes.observers)
         .map(|_| observed.observe::<Pose>().unwrap())
         .collect();
@@ -82,7 +82,7 @@ fn a_publisher_has_memory_left_whatever_its_subscribers_hold() {
 
 #[test]
 fn the_footprint_is_what_the_segments_take() {
-    let run = Run::begin();
+    let run = Rig::begin();
     let manifest = &run.manifest;
     let _scans = writer::<Scan>(manifest);
     let _rasters = writer::<Masked>(manifest);
@@ -104,8 +104,8 @@ fn the_footprint_is_what_the_segments_take() {
 
 #[test]
 fn observers_leave_the_places_of_the_stages_free() {
-    let run = Run::begin();
-    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let run = Rig::begin();
+    let observed = Run::at(&run.manifest.root).unwrap();
     let attached: Vec<_> = (0..WINDOW.observers)
         .map(|_| observed.try_attach::<Pose>(Pose::ENTRY).unwrap())
         .collect();
@@ -123,12 +123,12 @@ fn observers_leave_the_places_of_the_stages_free() {
 #[test]
 fn an_observer_of_an_earlier_run_does_not_disturb_a_later_one_with_the_same_results() {
     let out = Rc::new(tempfile::tempdir().unwrap());
-    let earlier = Run::writing_to(&out);
-    let observed = ObservedRun::writing_to(out.path()).unwrap();
+    let earlier = Rig::writing_to(&out);
+    let observed = Run::open(out.path()).unwrap();
     let mut observer = observed.observe::<Pose>().unwrap();
     drop(earlier);
     assert!(matches!(observer.next(Duration::MAX), Ok(Next::Ended)));
-    let later = Run::writing_to(&out);
+    let later = Rig::writing_to(&out);
     drop(observer);
     drop(observed);
     // A restarted stage opens its topics again.
@@ -139,13 +139,13 @@ fn an_observer_of_an_earlier_run_does_not_disturb_a_later_one_with_the_same_resu
 #[test]
 fn without_a_run_there_is_nothing_to_observe() {
     let out = tempfile::tempdir().unwrap();
-    let refused = ObservedRun::writing_to(out.path()).map(drop);
+    let refused = Run::open(out.path()).map(drop);
     assert!(matches!(refused, Err(RunError::NotRunning { .. })));
 }
 
 #[test]
 fn an_observer_that_comes_late_receives_the_last_loops() {
-    let run = Run::begin();
+    let run = Rig::begin();
     let loops = writer::<Loop>(&run.manifest);
     let kept = Loop::sizes(&WINDOW).history as u64;
     for seq in 0..kept + 5 {
@@ -158,7 +158,7 @@ fn an_observer_that_comes_late_receives_the_last_loops() {
         };
         loops.publish(header, None).unwrap();
     }
-    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let observed = Run::at(&run.manifest.root).unwrap();
     let mut observer = observed.observe::<Loop>().unwrap();
     loops.accept_readers().unwrap();
     for expected in 5..kept + 5 {
@@ -172,12 +172,12 @@ fn an_observer_that_comes_late_receives_the_last_loops() {
 
 #[test]
 fn a_run_without_slam_has_no_loops_to_observe_and_one_without_a_map_no_fixes() {
-    let run = Run::begin();
+    let run = Rig::begin();
     let mut manifest = run.manifest.clone();
     manifest.window.slam = false;
     manifest.window.localises = false;
     manifest.write("").unwrap();
-    let observed = ObservedRun::at(&run.manifest.root).unwrap();
+    let observed = Run::at(&run.manifest.root).unwrap();
     let refused = observed.observe::<Loop>().map(drop).unwrap_err();
     assert!(refused.to_string().contains("`loop`: only a run with SLAM"));
     let refused = observed.observe::<Fix>().map(drop).unwrap_err();

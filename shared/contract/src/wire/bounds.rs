@@ -44,8 +44,8 @@ pub enum Bounds {
     CountedBy(&'static str),
 }
 
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Number {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Number {
     Whole(u64),
     Signed(i64),
     Single(f32),

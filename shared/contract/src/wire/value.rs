@@ -51,6 +51,11 @@ impl Structure {
 }
 
 impl<'a> Value<'a> {
+    /// Returns a number; `None` for an array or a structure.
+    pub fn number(&self) -> Option<Number> {
+        self.kind.number(self.bytes)
+    }
+
     /// Returns the bytes of the elements that have a meaning.
     pub fn content(&self) -> &'a [u8] {
         match self.kind {
@@ -92,7 +97,7 @@ impl<'a> Value<'a> {
 
 impl Serialize for Value<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self.kind.number(self.bytes) {
+        match self.number() {
             Some(Number::Whole(number)) => return serializer.serialize_u64(number),
             Some(Number::Signed(number)) => return serializer.serialize_i64(number),
             Some(Number::Single(number)) => return serializer.serialize_f32(number),

@@ -169,7 +169,7 @@ fn unlink_incomplete_tags(directory: &Path) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_client::observer::ObservedRun;
+    use gyre_client::Run;
     use gyre_contract::Pose;
     use gyre_transport::wake::Signals;
 
@@ -199,7 +199,7 @@ mod tests {
         run.create_services().unwrap();
         let manifest = run.manifest();
         let transport = manifest.transport().unwrap();
-        let observed = ObservedRun::at(&manifest.root).unwrap();
+        let observed = Run::at(&manifest.root).unwrap();
         let _observer = observed.observe::<Pose>().unwrap();
         let of_observer = ports_of(manifest, &transport.living_nodes(observer::NAME));
         let file = |port: &str| {

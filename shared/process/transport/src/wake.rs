@@ -175,6 +175,12 @@ pub fn wait_for(listener: &Listener, limit: Duration) -> Result<(), RunError> {
     }
 }
 
+/// Sleeps until a descriptor has something to read, or `limit` has passed.
+pub fn wait_for_readable(descriptor: &impl AsFd, limit: Duration) -> Result<(), RunError> {
+    let polled = PollFd::new(descriptor, PollFlags::IN);
+    sleep_until_ready(&mut [polled], limit).map(drop)
+}
+
 fn sleep_until_ready(polled: &mut [PollFd<'_>], limit: Duration) -> Result<bool, RunError> {
     let limit = Timespec {
         tv_sec: limit.as_secs() as i64,

@@ -1,10 +1,6 @@
 //! The copy of a run of another machine.
 
-use gyre_client::{
-    RecordedMessage, RunError, TopicWriter,
-    observer::Sequence,
-    wake::{MAX_WAIT, Signals},
-};
+use gyre_client::{MAX_WAIT, RecordedMessage, RunError, Signals, TopicWriter, observer::Sequence};
 use gyre_contract::{Limits, Message as _, Pose, PoseHeader, Use, flag, topic};
 use gyre_journal::Journal;
 use gyre_supervise::rig::Rig;

@@ -9,7 +9,7 @@ use std::{
 };
 
 use bytemuck::bytes_of;
-use gyre_client::{Received, clock, observer::ObservedRun};
+use gyre_client::{Received, Run, clock};
 use gyre_contract::{
     Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
 };
@@ -159,7 +159,7 @@ fn report(followed: &Followed, hub: &Hub) {
 }
 
 fn announce(followed: &Followed, hub: &Hub) -> Option<PathBuf> {
-    let run = ObservedRun::writing_to(&followed.out).ok()?;
+    let run = Run::open(&followed.out).ok()?;
     let channels = hub.channels.iter().enumerate();
     let of_run = channels.filter(|(_, channel)| channel.is_of(run.manifest()));
     hub.of_run.send_replace(of_run.map(|(id, _)| id).collect());

@@ -1,9 +1,6 @@
 //! The observers of the topics that are recorded.
 
-use gyre_client::{
-    Listener, RecordedMessage, RunError, clock,
-    observer::{ObservedRun, TopicObserver},
-};
+use gyre_client::{Listener, RecordedMessage, Run, RunError, TopicObserver, clock};
 use gyre_contract::{Topic, Use};
 use gyre_recording::{Incoming, Position};
 
@@ -18,20 +15,20 @@ pub struct Counts {
     pub missed: u64,
 }
 
-pub(crate) struct Tap<'run> {
+pub(crate) struct Tap {
     topic: &'static Topic,
-    observer: TopicObserver<'run>,
+    observer: TopicObserver,
     recorded: u64,
     dropped: u64,
     reported: u64,
     generation: u32,
 }
 
-impl<'run> Tap<'run> {
+impl Tap {
     /// Observes a topic. Messages from the position `expected` on are to be recorded, if it is
     /// known: those before are in earlier parts.
     pub(crate) fn on(
-        run: &'run ObservedRun,
+        run: &Run,
         topic: &'static Topic,
         expected: Option<Position>,
     ) -> Result<Self, RunError> {

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{RunError, wake::Signals};
+use gyre_client::{RunError, Signals};
 use gyre_contract::StageId;
 use gyre_journal::checkpoint;
 use gyre_supervise::SuperviseError;

@@ -2,14 +2,9 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use gyre_client::{
-    Listener, RunError,
-    observer::{ObservedRun, TopicObserver},
-};
-use gyre_contract::{StageId, flag};
+use gyre_client::{Listener, Run, RunError, TopicObserver};
+use gyre_contract::{StageId, StageTopics, flag};
 use gyre_supervise::rig::Recorded;
-
-use gyre_contract::StageTopics;
 
 /// Items that are not complete. Beyond them the oldest is given up: in live mode most scans never
 /// become an item.
@@ -43,10 +38,10 @@ impl Observed {
 }
 
 pub(crate) struct Observation<'run> {
-    run: &'run ObservedRun,
+    run: &'run Run,
     /// The inputs, the output, then the feedback.
     topics: Vec<&'static str>,
-    observers: Vec<TopicObserver<'run>>,
+    observers: Vec<TopicObserver>,
     forward: usize,
     lag: u64,
     /// The messages of incomplete items, by the number of the scan at its source, because masking
@@ -63,7 +58,7 @@ pub(crate) struct Observation<'run> {
 
 impl<'run> Observation<'run> {
     pub(crate) fn of(
-        run: &'run ObservedRun,
+        run: &'run Run,
         stage: StageId,
         stage_topics: &StageTopics,
     ) -> Result<Self, RunError> {

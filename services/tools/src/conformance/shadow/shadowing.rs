@@ -8,11 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{
-    Listener, RunError, clock,
-    observer::ObservedRun,
-    wake::{MAX_WAIT, Signals},
-};
+use gyre_client::{Listener, MAX_WAIT, Run, RunError, Signals, clock};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::StageId;
 
@@ -71,7 +67,7 @@ impl<'a> Shadowing<'a> {
     pub(crate) fn begin(
         options: &'a Options,
         program: &'a ShadowProgram,
-        run: &'a ObservedRun,
+        run: &'a Run,
         signals: &'a Signals,
         record: Record,
     ) -> Result<Self, RunError> {

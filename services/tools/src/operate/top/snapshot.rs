@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{Usage, clock, control::Control, observer::Next};
+use gyre_client::{Next, Usage, clock, control::Control};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{
     PoseHeader, SampleRates, StageId, WitnessCounts,
@@ -46,10 +46,10 @@ pub struct Use {
     pub wake_ups: f64,
 }
 
-pub struct Snapshots<'run> {
+pub struct Snapshots {
     control: Control,
-    poses: Poses<'run>,
-    scans: Option<Scans<'run>>,
+    poses: Poses,
+    scans: Option<Scans>,
     rates: SampleRates,
     recent: VecDeque<PoseHeader>,
     longest_us: u64,
@@ -61,8 +61,8 @@ pub struct Snapshots<'run> {
     earlier: Option<(Instant, u64, BTreeMap<u32, Usage>)>,
 }
 
-impl<'run> Snapshots<'run> {
-    pub fn of(control: Control, poses: Poses<'run>, scans: Option<Scans<'run>>) -> Self {
+impl Snapshots {
+    pub fn of(control: Control, poses: Poses, scans: Option<Scans>) -> Self {
         Self {
             control,
             poses,

@@ -9,11 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{
-    RunError, last_line,
-    observer::{ObservedRun, Observer},
-    run::sweep,
-};
+use gyre_client::{Observer, Run, RunError, last_line, run::sweep};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Pose, PoseHeader, run::Scenario};
 use gyre_storage::create_folder;
@@ -95,13 +91,13 @@ impl<'a> Running<'a> {
         }
     }
 
-    pub fn attach(&mut self) -> Result<ObservedRun, Failure> {
+    pub fn attach(&mut self) -> Result<Run, Failure> {
         // A supervisor of the same results may still be there, if an earlier run was killed.
         while status_of(&self.out, self.pid()).is_none() {
             self.require_life()?;
             thread::sleep(POLL_PERIOD);
         }
-        let run = ObservedRun::writing_to(&self.out)?;
+        let run = Run::open(&self.out)?;
         match run.manifest().window.observers {
             0 => Err("run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more".into()),
             _ => Ok(run),
@@ -128,7 +124,7 @@ impl<'a> Running<'a> {
 
     /// Waits for the first poses, and returns the newest of them; where hardly a scan comes, for
     /// one.
-    pub fn warm_up(&mut self, poses: &mut Observer<'_, Pose>) -> Result<PoseHeader, Failure> {
+    pub fn warm_up(&mut self, poses: &mut Observer<Pose>) -> Result<PoseHeader, Failure> {
         let enough = match self.setup.scenario {
             Scenario::Idle => 1,
             _ => WARM_UP,

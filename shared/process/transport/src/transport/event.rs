@@ -1,7 +1,7 @@
 //! Events: notifications without content.
 
 use std::{
-    os::fd::{AsFd, BorrowedFd},
+    os::fd::{AsFd, BorrowedFd, OwnedFd},
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
@@ -88,6 +88,14 @@ impl Listener {
         let taken = self.port.try_wait(|_| notifications += 1);
         taken.map_err(|e| RunError::transport(format!("read {}", self.event), e))?;
         Ok(notifications)
+    }
+}
+
+impl Listener {
+    /// Returns a descriptor of its own, with which another thread can wait.
+    pub fn descriptor(&self) -> Result<OwnedFd, RunError> {
+        let descriptor = self.as_fd().try_clone_to_owned();
+        descriptor.map_err(|e| RunError::transport(format!("wait for {}", self.event), e))
     }
 }
 
