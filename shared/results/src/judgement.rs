@@ -135,7 +135,6 @@ pub fn judge_motions(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::path::PathBuf;
 
     use gyre_datasets::read_trajectory;

@@ -77,7 +77,6 @@ impl Trajectory {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

@@ -1,6 +1,5 @@
 //! Localisation on a street of posts: found at any heading, tracked, lost outside the map, found
 //! again.
-#![allow(clippy::unwrap_used)]
 
 use std::f64::consts::PI;
 

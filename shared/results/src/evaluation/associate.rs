@@ -169,7 +169,6 @@ pub(crate) fn truth_at(truth: &Trajectory, stamp_ns: i64, max_gap_ns: i64) -> At
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
     use std::f64::consts::PI;

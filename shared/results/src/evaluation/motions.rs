@@ -167,7 +167,6 @@ fn require_motions(motions: &[TimedMotion]) -> Result<(), EvaluationError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use nalgebra::Matrix3;
 
     use super::*;

@@ -96,7 +96,6 @@ fn extent_m(poses: &[Pose]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

@@ -1,5 +1,3 @@
-#![allow(clippy::unwrap_used)]
-
 use gyre_geometry::{
     SparsePoint, Twist,
     scan::{OwnedScan, Sense, flag},

@@ -1,8 +1,6 @@
 //! Trajectories, graphs and places as their users call them. One program, so that all of it is
 //! linked once.
 
-#![allow(clippy::unwrap_used)]
-
 mod common;
 
 mod consistency;
