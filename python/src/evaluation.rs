@@ -2,10 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf};
 
-use gyre_results::evaluation::{
-    TimedPoses,
-    plot::{errors_svg, trajectory_svg},
-};
+use gyre_results::evaluation::plot::{errors_svg, trajectory_svg};
 use pyo3::{exceptions::PyValueError, prelude::*};
 
 use crate::{errors, trajectory::Trajectory, values};
@@ -26,14 +23,8 @@ pub fn evaluate(
     let step = NonZeroUsize::new(step);
     let step = step.ok_or_else(|| PyValueError::new_err("step is 0, but must be 1 or more"))?;
     let (estimate, truth) = (&estimate.get().0, &truth.get().0);
-    let evaluation =
-        py.detach(|| gyre_results::evaluation::evaluate(timed(estimate), timed(truth), step));
+    let evaluation = py.detach(|| gyre_results::evaluation::evaluate(estimate, truth, step));
     evaluation.map(Evaluation).map_err(errors::trajectory)
-}
-
-fn timed(trajectory: &gyre_radar::Trajectory) -> TimedPoses<'_> {
-    let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
-    TimedPoses::new(stamps, &trajectory.poses)
 }
 
 /// The errors of a trajectory against ground truth. `str(evaluation)` is a table, and `to_dict()`

@@ -88,7 +88,7 @@ impl Track {
     }
 
     fn new(path: PathBuf, trajectory: Trajectory) -> Self {
-        let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
+        let stamps = trajectory.stamps();
         let max_gap_ns = gyre_results::evaluation::max_gap_ns(stamps, MAX_GAP_NS).unsigned_abs();
         Self {
             path,

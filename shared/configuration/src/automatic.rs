@@ -200,7 +200,6 @@ fn median(counts: &[u64; 256]) -> Option<u8> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     const NAVTECH: Measured = Measured {

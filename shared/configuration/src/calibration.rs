@@ -51,7 +51,6 @@ pub fn overrides(file: &Path) -> Result<Vec<String>, ConfigurationError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

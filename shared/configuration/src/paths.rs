@@ -208,7 +208,6 @@ fn value_mut<'a>(table: &'a mut Table, key: &str) -> Option<&'a mut Value> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::fs;
 
     use super::*;

@@ -17,7 +17,7 @@ use gyre_radar::Trajectory;
 
 use crate::{
     evaluation::{Evaluation, MatchedMotions, NeesOptions, TimedMotion, TruthSigma, part},
-    judgement::{Judgement, judge_by, judge_motions, note_time_offset, take_time_offset_out},
+    judgement::{Judgement, judge_motions, note_time_offset, take_time_offset_out},
     odometry,
     out::{Content, Out, require_results},
     results::truth_of,
@@ -37,7 +37,7 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         true => offset = Some(take_time_offset_out(&estimate, &mut truth)?),
         false => note_time_offset(&estimate, &truth),
     }
-    let evaluation = judge_by(&estimate, &truth, arguments.step)?;
+    let evaluation = crate::evaluation::evaluate(&estimate, &truth, arguments.step)?;
     let motions = judged_motions(arguments, &file, &estimate, &truth, &evaluation)?;
     let options = NeesOptions {
         lengths: arguments.nees_lengths.clone(),
@@ -134,7 +134,7 @@ fn judged_motions(
 const ROUNDING_NS: i64 = 1_000;
 
 fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {
-    let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
+    let stamps = trajectory.stamps();
     motions.iter().all(|motion| {
         let first = motion.to_ns.saturating_sub(ROUNDING_NS);
         let next = stamps.get(stamps.partition_point(|stamp| *stamp < first));

@@ -1,7 +1,7 @@
 //! Metrics of planar odometry against ground truth: KITTI drift, ATE, RPE, segment error and NEES,
 //! with plots; and of tracked objects. [`evaluate`] is the whole method, one line a step.
 //!
-//! The crate computes on slices of poses and stamps; files are read elsewhere. A
+//! It computes on poses and stamps in memory; files are read elsewhere. A
 //! [`Pose`](gyre_geometry::Pose) is the pose of the sensor in a fixed frame (REP-103: x forward, y
 //! left, yaw counter-clockwise); stamps are in ns. Estimate and ground truth may have different
 //! fixed frames.
@@ -28,7 +28,7 @@ pub mod seg;
 mod segments;
 mod truth_sigma;
 
-pub use associate::{Coverage, TimedPoses, associate};
+pub use associate::{Coverage, associate};
 pub use ate::{Ate, align, ate};
 pub use bands::{BandSample, Bands, bands};
 pub use end::{EndError, end_error};

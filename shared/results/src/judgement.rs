@@ -1,11 +1,11 @@
 //! The evaluation of a trajectory against ground truth, as `gyre run` and `gyre evaluate` both
 //! report it: its errors, and the consistency of its covariances.
 
-use std::{fmt, num::NonZeroUsize};
+use std::fmt;
 
 use crate::evaluation::{
     Bands, Coverage, Evaluation, EvaluationError, MatchedMotions, Nees, NeesOptions, STEP,
-    TimedMotion, TimedPoses, bands, nees,
+    TimedMotion, bands, nees,
     plot::{bands_svg, errors_svg, trajectory_svg},
 };
 use gyre_configuration::terminal::{Failure, print};
@@ -111,16 +111,7 @@ pub fn take_time_offset_out(estimate: &Trajectory, truth: &mut Trajectory) -> Re
 
 /// Evaluates by time where both have stamps, else pose by pose.
 pub fn judge(estimate: &Trajectory, truth: &Trajectory) -> Result<Evaluation, EvaluationError> {
-    judge_by(estimate, truth, STEP)
-}
-
-/// Evaluates by segments that start at every `step`-th pose.
-pub fn judge_by(
-    estimate: &Trajectory,
-    truth: &Trajectory,
-    step: NonZeroUsize,
-) -> Result<Evaluation, EvaluationError> {
-    crate::evaluation::evaluate(timed(estimate), timed(truth), step)
+    crate::evaluation::evaluate(estimate, truth, STEP)
 }
 
 pub fn judge_motions(
@@ -139,17 +130,11 @@ pub fn judge_motions(
                 .into(),
         );
     }
-    Ok(MatchedMotions::new(motions, timed(truth), max_gap_ns)?)
-}
-
-fn timed(trajectory: &Trajectory) -> TimedPoses<'_> {
-    let stamps_ns = trajectory.stamp_ns.as_deref().unwrap_or_default();
-    TimedPoses::new(stamps_ns, &trajectory.poses)
+    Ok(MatchedMotions::new(motions, truth, max_gap_ns)?)
 }
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::path::PathBuf;
 
     use gyre_datasets::read_trajectory;

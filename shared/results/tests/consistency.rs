@@ -1,9 +1,10 @@
 //! NEES and error bands of motions whose covariance is known.
 
 use gyre_geometry::{OdometryMotion, Pose, UncertainMotion, pose};
+use gyre_radar::Trajectory;
 use gyre_results::evaluation::{
-    MatchedMotions, Nees, NeesFigure, NeesFigures, NeesOptions, TimedMotion, TimedPoses,
-    TruthSigma, bands, nees, plot::bands_svg,
+    MatchedMotions, Nees, NeesFigure, NeesFigures, NeesOptions, TimedMotion, TruthSigma, bands,
+    nees, plot::bands_svg,
 };
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
@@ -33,8 +34,7 @@ fn disturbed(truth: &Pose, error: Vector3<f64>) -> Pose {
 
 /// A winding drive and its motions with errors drawn from `covariance()`.
 struct Drive {
-    stamps_ns: Vec<i64>,
-    truth: Vec<Pose>,
+    truth: Trajectory,
     motions: Vec<TimedMotion>,
 }
 
@@ -59,15 +59,16 @@ impl Drive {
         };
         let motions = (0..motions).map(motion).collect();
         Self {
-            stamps_ns,
-            truth,
+            truth: Trajectory {
+                stamp_ns: Some(stamps_ns),
+                poses: truth,
+            },
             motions,
         }
     }
 
     fn matched(&self) -> MatchedMotions {
-        let truth = TimedPoses::new(&self.stamps_ns, &self.truth);
-        MatchedMotions::new(&self.motions, truth, INTERVAL_NS).unwrap()
+        MatchedMotions::new(&self.motions, &self.truth, INTERVAL_NS).unwrap()
     }
 
     fn nees(&self) -> Nees {
@@ -124,9 +125,9 @@ fn motions_that_share_the_noise_of_their_poses_are_consistent_over_all_lengths()
     let mut drive = Drive::new(12_800, 7);
     let spread = covariance().cholesky().unwrap().l();
     let mut draw = |share: f64| spread * gaussian(&mut random) * share.sqrt();
-    let (mut drifted, mut last) = (drive.truth[0], drive.truth[0]);
+    let (mut drifted, mut last) = (drive.truth.poses[0], drive.truth.poses[0]);
     for (k, motion) in drive.motions.iter_mut().enumerate() {
-        let step = drive.truth[k].inv_mul(&drive.truth[k + 1]);
+        let step = drive.truth.poses[k].inv_mul(&drive.truth.poses[k + 1]);
         drifted *= disturbed(&step, draw(DRIFT_SHARE));
         let noisy = drifted * disturbed(&Pose::identity(), draw(0.5 * (1.0 - DRIFT_SHARE)));
         motion.estimate.motion = last.inv_mul(&noisy);
@@ -154,7 +155,7 @@ fn the_noise_of_the_ground_truth_is_accounted_for() {
     };
     let scale = Vector3::new(sigma.position_m, sigma.position_m, sigma.yaw_rad);
     let mut random = ChaCha8Rng::seed_from_u64(6);
-    for truth in &mut drive.truth {
+    for truth in &mut drive.truth.poses {
         *truth = disturbed(truth, gaussian(&mut random).component_mul(&scale));
     }
     let matched = drive.matched();

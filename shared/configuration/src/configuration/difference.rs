@@ -36,7 +36,6 @@ pub fn first(begun: &Table, now: &Table) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -1,4 +1,3 @@
-#![allow(clippy::unwrap_used)]
 use std::fs;
 
 use super::*;
@@ -44,9 +43,16 @@ run.stall_timeout_s=inf | stall_timeout_s is inf | 0 or more
 run.scheduling.nice=-21 | nice | -20 to 19
 raster.n=0 | raster.n
 raster.cell_m=-1.0 | raster | cell_m
+raster.cell_m=nan | raster.cell_m is
+raster.min_range_m=-1.0 | raster.min_range_m is
+raster.cel_m=0.4 | [raster] has no key `cel_m`
 raster.cell_m=wide | [raster]: cell_m is "wide", but must be a number
 points.capacity=70000 | points.capacity
 points.capacity=0 | points.capacity is 0 | 1 or more
+points.beam_deg=nan | points.beam_deg is
+points.range_cell_m=0.0 | points.range_cell_m is
+points.min_range_m=-1.0 | points.min_range_m is
+points.max_range_m=5.0 | points.max_range_m is
 refinement.kind=global-map | global-map | local-map
 refinement.keyframes=0 | refinement.keyframes is 0 | 1 to 64
 refinement.cell_m=-0.4 | refinement.cell_m is -0.4 | 0.05 to 10
@@ -58,10 +64,17 @@ masking.lag=0 | lag
 masking.lag=99 | masking.lag is 99 | 16
 masking.threads=65 | [masking] | threads is 65 | 1 to 64
 masking.provider=npu | npu
+masking.backend=tract | tract | rten
+masking.backend=rten; masking.runtime=/anywhere | runtime is a setting of ONNX Runtime
 masking.backend=rten; masking.provider=cuda; masking.kind=learned | provider is a setting of ONNX Runtime | `onnxruntime`
 masking.threshold=256 | threshold is `256`, but must be a whole number
 masking.threshold=abc | [masking]: threshold is "abc", but must be a whole number from 0 to 255
 rotation.band_high=7.0 | rotation | band_high
+rotation.band_low=nan | rotation.band_low is
+rotation.reach_deg=91.0 | rotation.reach_deg is 91
+rotation.angles=0 | rotation.angles is 0
+rotation.angels=720 | [rotation] has no key `angels`
+translation.reach=3.0 | [translation] has no key `reach`
 dataset.format=oxfort | oxfort | oxford
 stages.masking.command=./x | [stages.masking]: command is "./x", but must be a list, as in ["./x"]
 stages.masking.restart.limit=-1 | masking | -1

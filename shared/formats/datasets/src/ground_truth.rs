@@ -101,7 +101,7 @@ pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
 }
 
 fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
-    let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
+    let stamps = trajectory.stamps();
     let mut first = 0;
     for (index, pose) in trajectory.poses.iter().enumerate().take(stamps.len()) {
         if stamps[index] != stamps[first] {

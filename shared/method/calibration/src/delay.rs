@@ -44,7 +44,6 @@ pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     /// The delay of a sensor whose measurements are so late and scaled, beside a radar with noise,

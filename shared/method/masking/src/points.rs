@@ -70,7 +70,6 @@ impl RasterFrame {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::tests::{AZIMUTHS, empty};
     use gyre_geometry::{OwnedScan, Sense};

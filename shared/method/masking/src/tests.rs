@@ -1,5 +1,3 @@
-#![allow(clippy::unwrap_used)]
-
 use super::*;
 use gyre_geometry::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
 use ndarray::Array2;

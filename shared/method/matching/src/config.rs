@@ -168,32 +168,3 @@ impl TranslationConfig {
 const ABOVE_0: [f64; 2] = [f64::MIN_POSITIVE, f64::MAX];
 pub(crate) const METRES: Bounds = (ABOVE_0, "metres, above 0");
 pub(crate) const POSITIVE: Bounds = (ABOVE_0, "a positive number");
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn missing_keys_have_their_defaults() {
-        let text = "form = \"line14\"\nangles = 733\npeak = \"parabola\"";
-        let config: RotationConfig = toml::from_str(text).unwrap();
-        let want = RotationConfig {
-            form: RotationForm::ProfileMean,
-            angles: 733,
-            peak: Peak::Parabola,
-            ..RotationConfig::default()
-        };
-        assert_eq!(config, want);
-        let written = toml::to_string(&want).unwrap();
-        assert_eq!(toml::from_str::<RotationConfig>(&written).unwrap(), want);
-    }
-
-    #[test]
-    fn unknown_keys_are_rejected() {
-        let wrong = toml::from_str::<RotationConfig>("angels = 720").unwrap_err();
-        assert!(wrong.to_string().contains("angels"));
-        let wrong = toml::from_str::<TranslationConfig>("reach = 3.0").unwrap_err();
-        assert!(wrong.to_string().contains("reach"));
-    }
-}

@@ -132,7 +132,6 @@ fn sum_row(f: &[f32], g: &[f32], discs: &[Disc; 2]) -> Sums {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_geometry::pose;
     use ndarray::Array2;
     use proptest::prelude::*;

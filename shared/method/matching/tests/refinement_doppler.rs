@@ -1,7 +1,7 @@
 //! The velocity by Doppler, as a witness of the way.
 
 use gyre_geometry::{
-    SparsePoint, pose,
+    SparsePoint,
     samples::{DopplerConfig, DopplerKind, DopplerVelocity, GyroConfig, WheelsConfig},
 };
 use gyre_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner};
@@ -14,14 +14,6 @@ const INSIDE: usize = 40;
 /// Measured velocity over the true one.
 const SCALE: f64 = 0.98;
 const SIGMA_MPS: f64 = 0.05;
-
-/// A vehicle that slows down from 10 m/s.
-fn slower() -> Drive {
-    Drive {
-        acceleration_mps2: -0.2,
-        ..Drive::steady(10.0, 0.0, SCANS)
-    }
-}
 
 fn witnessed() -> Refiner {
     let doppler = DopplerConfig {
@@ -48,21 +40,16 @@ fn refine_with(
             bearings: 200,
         })
     };
-    let mut numbers = Numbers(7);
-    let search = |k: usize| match k < INSIDE {
-        true => searched(drive, k - 1),
-        false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
-    };
     let aiding = |k: usize| Aiding {
         velocities: [velocity(k - 1), velocity(k)],
         ..Aiding::default()
     };
-    refine_aided(refiner, scans, aiding, search)
+    refine_aided(refiner, scans, aiding, search_until(INSIDE, drive))
 }
 
 #[test]
 fn in_a_tunnel_doppler_says_how_far() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let scans = into_a_tunnel(&drive, Vec::new());
     let refined = refine_with(&mut witnessed(), (&drive, &scans), |_| Some(SCALE));
     for (k, refined) in refined.iter().enumerate().skip(INSIDE) {
@@ -82,7 +69,7 @@ fn in_a_tunnel_doppler_says_how_far() {
 
 #[test]
 fn scans_that_match_nothing_are_bridged_by_doppler_alone() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let town = town([[-110.0, 400.0], [-110.0, 110.0]], 1);
     let mut scans = scans(&town, &drive, &NOISY);
     scans[INSIDE..INSIDE + 24].fill(Vec::new());
@@ -104,17 +91,13 @@ fn scans_that_match_nothing_are_bridged_by_doppler_alone() {
 
 #[test]
 fn a_velocity_that_a_certain_match_contradicts_is_refused_and_changes_no_motion() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let town = town([[-110.0, 400.0], [-110.0, 110.0]], 1);
     let scans = &scans(&town, &drive, &NOISY)[..INSIDE];
     // Beside a bus, which fills most bearings.
     let captured = |k: usize| Some(if (20..26).contains(&k) { 1.5 } else { 1.0 });
     let refined = refine_with(&mut witnessed(), (&drive, scans), captured);
-    let refused: Vec<usize> = (1..)
-        .zip(&refined)
-        .filter(|(_, it)| it.doppler.is_some_and(|doppler| doppler.slip))
-        .map(|(k, _)| k)
-        .collect();
+    let refused = scans_where(&refined, |it| it.doppler.is_some_and(|it| it.slip));
     // The way from the last of them has half of its error, which is within the gate once the
     // vehicle is slow.
     assert!(
@@ -131,7 +114,7 @@ fn a_velocity_that_a_certain_match_contradicts_is_refused_and_changes_no_motion(
 
 #[test]
 fn without_the_section_velocities_change_no_bit() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let scans = &into_a_tunnel(&drive, Vec::new())[..INSIDE + 20];
     let poses = |refined: &[Refined]| -> Vec<_> {
         refined

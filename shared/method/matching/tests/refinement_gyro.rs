@@ -42,8 +42,9 @@ fn refine_with(
 }
 
 fn judged(refined: &[Refined], verdict: Verdict) -> Vec<usize> {
-    let of = |(k, it): (usize, &Refined)| (it.gyro?.verdict == verdict).then_some(k);
-    (1..).zip(refined).filter_map(of).collect()
+    scans_where(refined, |it| {
+        it.gyro.is_some_and(|it| it.verdict == verdict)
+    })
 }
 
 #[test]

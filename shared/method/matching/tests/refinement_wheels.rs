@@ -89,11 +89,7 @@ fn wheels_that_slip_change_no_motion_while_the_radar_sees() {
     let (drive, scans) = faster();
     let slip = |k: usize| Some(if (40..46).contains(&k) { 1.5 } else { 1.0 });
     let slipping = refine_with(&mut refiner(), (&drive, &scans), slip, true);
-    let slips: Vec<usize> = (1..)
-        .zip(&slipping)
-        .filter(|(_, it)| it.wheels.is_some_and(|wheels| wheels.slip))
-        .map(|(k, _)| k)
-        .collect();
+    let slips = scans_where(&slipping, |it| it.wheels.is_some_and(|it| it.slip));
     assert_eq!(slips, (40..46).collect::<Vec<_>>());
     let (whole, _) = off(&drive, &slipping, 0..SCANS - 1);
     assert!(whole.translation.vector.norm() < 0.5, "{whole}");

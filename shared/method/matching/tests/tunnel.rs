@@ -10,24 +10,12 @@ const INSIDE: usize = 40;
 /// Measured distance over the true one.
 const SCALE: f64 = 0.99;
 
-fn slower() -> Drive {
-    Drive {
-        acceleration_mps2: -0.2,
-        ..Drive::steady(10.0, 0.0, SCANS)
-    }
-}
-
 fn refine_with(
     refiner: &mut Refiner,
     (drive, scans): (&Drive, &[Vec<SparsePoint>]),
     wheels: impl Fn(usize) -> Option<f64>,
 ) -> Vec<Refined> {
-    let mut numbers = Numbers(7);
-    // Inside the search finds any way.
-    let search = |k: usize| match k < INSIDE {
-        true => searched(drive, k - 1),
-        false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
-    };
+    let search = search_until(INSIDE, drive);
     refine_searched(refiner, (drive, scans), wheels, search)
 }
 
@@ -54,7 +42,7 @@ fn slid(refined: &Refined) -> bool {
 
 #[test]
 fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let scans = into_a_tunnel(&drive, Vec::new());
     let mut refiner = refiner();
     let refined = refine_with(&mut refiner, (&drive, &scans), |_| Some(SCALE));
@@ -81,7 +69,7 @@ fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
 
 #[test]
 fn radar_alone_says_that_it_does_not_know_how_far() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let scans = into_a_tunnel(&drive, Vec::new());
     let refined = refine_with(&mut refiner(), (&drive, &scans), |_| None);
     assert!(refined[INSIDE..].iter().all(slid));
@@ -97,7 +85,7 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
 
 #[test]
 fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let scans = into_a_tunnel(&drive, Vec::new());
     let mut refiner = refiner();
     let measured = |k: usize| (k < SCANS - 12).then_some(SCALE);
@@ -112,7 +100,7 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
 
 #[test]
 fn one_scan_without_wheels_inside_does_not_ask_the_search() {
-    let drive = slower();
+    let drive = slower(SCANS);
     let scans = into_a_tunnel(&drive, Vec::new());
     let mut refiner = refiner();
     let measured = |k: usize| (!k.is_multiple_of(5)).then_some(SCALE);
@@ -131,7 +119,7 @@ fn one_scan_without_wheels_inside_does_not_ask_the_search() {
 #[test]
 fn as_long_as_the_search_sees_the_way_it_is_seen() {
     let posts = posts([[0.0, 400.0], [5.0, 30.0]], 15.0, 9);
-    let drive = slower();
+    let drive = slower(SCANS);
     let scans = into_a_tunnel(&drive, posts);
     let search = |k: usize| searched(&drive, k - 1);
     for wheels in [None, Some(SCALE)] {

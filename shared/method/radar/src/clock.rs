@@ -242,7 +242,6 @@ impl Correlation {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::{Pose, pose};
 

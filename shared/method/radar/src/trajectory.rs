@@ -21,6 +21,11 @@ impl Trajectory {
         self.poses.is_empty()
     }
 
+    /// Returns the stamps, empty if the source has no times.
+    pub fn stamps(&self) -> &[i64] {
+        self.stamp_ns.as_deref().unwrap_or_default()
+    }
+
     pub fn path_length_m(&self) -> f64 {
         self.poses
             .windows(2)
@@ -72,7 +77,6 @@ impl Trajectory {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

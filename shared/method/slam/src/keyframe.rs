@@ -119,7 +119,6 @@ impl RecordReader<Keyframe> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::RecordLog;
 

@@ -76,7 +76,6 @@ impl KeyframeBuilder {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_geometry::pose;
 
     use super::*;

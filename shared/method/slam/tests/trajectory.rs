@@ -8,7 +8,10 @@ use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::common::{AROUND, Drive};
+use crate::{
+    common::{AROUND, Drive},
+    estimation::common::{apart, rms_apart},
+};
 
 const KEYFRAMES: usize = 4 * AROUND;
 
@@ -77,12 +80,6 @@ fn used(estimator: &TrajectoryEstimator) -> Vec<[usize; 2]> {
         .collect()
 }
 
-fn farthest_m(a: &[Pose], b: &[Pose]) -> f64 {
-    let apart = a.iter().zip(b);
-    let apart = apart.map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
-    apart.fold(0.0, f64::max)
-}
-
 fn estimate(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> TrajectoryEstimator {
     let mut estimator = odometry(drive, kind);
     loops
@@ -90,13 +87,6 @@ fn estimate(drive: &Drive, loops: &[Constraint], kind: EstimatorKind) -> Traject
         .for_each(|it| estimator.close_loop(it).unwrap());
     estimator.solve().unwrap();
     estimator
-}
-
-fn rms_m(drive: &Drive, poses: &[Pose]) -> f64 {
-    let squares = poses.iter().zip(&drive.truth);
-    let squares =
-        squares.map(|(a, b)| (a.translation.vector - b.translation.vector).norm_squared());
-    (squares.sum::<f64>() / poses.len() as f64).sqrt()
 }
 
 /// Odometry so uncertain that wrong loops pass its gate.
@@ -113,9 +103,9 @@ fn wrong_loops_are_rejected_and_right_ones_used() {
     let drive = uncertain();
     let right = right(&drive);
     let clean = estimate(&drive, &right, EstimatorKind::Graph);
-    let error_m = rms_m(&drive, clean.poses());
+    let error_m = rms_apart(clean.poses(), &drive.truth);
     let odometry: Vec<Pose> = drive.keyframes.iter().map(|it| it.pose.motion).collect();
-    let before_m = rms_m(&drive, &odometry);
+    let before_m = rms_apart(&odometry, &drive.truth);
     assert!(error_m < 0.2 * before_m, "{error_m} m, {before_m} m");
     for length in [1, 10] {
         let wrong = wrong(&drive, length);
@@ -128,7 +118,7 @@ fn wrong_loops_are_rejected_and_right_ones_used() {
         );
         let outvoted = |it: &&JudgedLoop| it.verdict == LoopVerdict::ContradictsLoops;
         assert!(estimator.loops().iter().filter(outvoted).count() > 0);
-        let worse_m = rms_m(&drive, estimator.poses()) - error_m;
+        let worse_m = rms_apart(estimator.poses(), &drive.truth) - error_m;
         assert!(worse_m < 0.01, "{worse_m} m");
         assert!(estimator.pose(KEYFRAMES - 1).unwrap().has_covariance());
     }
@@ -154,7 +144,7 @@ fn loops_taken_one_by_one_lead_where_all_at_once_do() {
     let all = estimate(&drive, &loops, EstimatorKind::Graph);
     let mut updated = update(&drive, &loops, EstimatorKind::Graph);
     assert_eq!(used(&updated), used(&all));
-    let apart_m = farthest_m(updated.poses(), all.poses());
+    let (apart_m, _) = apart(updated.poses(), all.poses());
     assert!(apart_m < 0.005, "{apart_m} m");
     updated.solve().unwrap();
     assert_eq!(updated.poses(), all.poses());
@@ -176,7 +166,7 @@ fn wrong_loops_that_came_first_are_withdrawn() {
     let all: Vec<_> = right.iter().chain(wrong).copied().collect();
     let all = estimate(&drive, &all, EstimatorKind::Graph);
     assert_eq!(used(&updated), used(&all));
-    let apart_m = farthest_m(updated.poses(), all.poses());
+    let (apart_m, _) = apart(updated.poses(), all.poses());
     assert!(apart_m < 0.005, "{apart_m} m");
 }
 
@@ -186,13 +176,13 @@ fn the_filter_corrects_as_the_graph_does_one_by_one_too() {
     let right = right(&drive);
     let [graph, filter] =
         [EstimatorKind::Graph, EstimatorKind::Filter].map(|kind| estimate(&drive, &right, kind));
-    let [by_graph_m, by_filter_m] = [&graph, &filter].map(|it| rms_m(&drive, it.poses()));
+    let [by_graph_m, by_filter_m] = [&graph, &filter].map(|it| rms_apart(it.poses(), &drive.truth));
     assert!(
         (by_graph_m - by_filter_m).abs() < 0.02,
         "{by_graph_m} m, {by_filter_m} m"
     );
     let updated = update(&drive, &right, EstimatorKind::Filter);
-    let apart_m = farthest_m(updated.poses(), filter.poses());
+    let (apart_m, _) = apart(updated.poses(), filter.poses());
     assert!(apart_m < 0.02, "{apart_m} m");
 }
 

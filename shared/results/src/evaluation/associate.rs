@@ -1,6 +1,7 @@
 //! Association: the ground-truth pose of each estimated pose, by time or by index.
 
 use gyre_geometry::{Pose, interpolate};
+use gyre_radar::Trajectory;
 use serde::Serialize;
 
 use crate::evaluation::{
@@ -9,28 +10,6 @@ use crate::evaluation::{
     gaps::max_gap_ns,
     matched::require_poses,
 };
-
-/// A trajectory: poses, and their stamps where they have any.
-#[derive(Debug, Clone, Copy)]
-pub struct TimedPoses<'a> {
-    /// One stamp a pose, ns, in order; empty without stamps.
-    pub stamps_ns: &'a [i64],
-    pub poses: &'a [Pose],
-}
-
-impl<'a> TimedPoses<'a> {
-    pub fn new(stamps_ns: &'a [i64], poses: &'a [Pose]) -> Self {
-        Self { stamps_ns, poses }
-    }
-
-    /// The poses without stamps, as in KITTI files.
-    pub fn untimed(poses: &'a [Pose]) -> Self {
-        Self {
-            stamps_ns: &[],
-            poses,
-        }
-    }
-}
 
 /// The widest gap between two stamps of the ground truth that is interpolated across, ns; wider if
 /// its own steps are: see [`max_gap_ns`].
@@ -60,13 +39,13 @@ pub enum Coverage {
 /// way round. If one of them has no stamps, pose `k` belongs to pose `k`, and the longer list is
 /// cut to the shorter.
 pub fn associate(
-    estimate: TimedPoses<'_>,
-    truth: TimedPoses<'_>,
+    estimate: &Trajectory,
+    truth: &Trajectory,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
-    require_poses(ESTIMATE, estimate.poses)?;
-    require_poses(TRUTH, truth.poses)?;
-    match estimate.stamps_ns.is_empty() || truth.stamps_ns.is_empty() {
-        true => by_index(estimate.poses, truth.poses),
+    require_poses(ESTIMATE, &estimate.poses)?;
+    require_poses(TRUTH, &truth.poses)?;
+    match estimate.stamps().is_empty() || truth.stamps().is_empty() {
+        true => by_index(&estimate.poses, &truth.poses),
         false => by_time(estimate, truth),
     }
 }
@@ -90,15 +69,15 @@ fn by_index(
 }
 
 fn by_time(
-    estimate: TimedPoses<'_>,
-    truth: TimedPoses<'_>,
+    estimate: &Trajectory,
+    truth: &Trajectory,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
-    require_stamps(ESTIMATE, &estimate)?;
-    require_stamps(TRUTH, &truth)?;
-    let max_gap_ns = max_gap_ns(truth.stamps_ns, LEAST_GAP_NS);
+    require_stamps(ESTIMATE, estimate)?;
+    require_stamps(TRUTH, truth)?;
+    let max_gap_ns = max_gap_ns(truth.stamps(), LEAST_GAP_NS);
     let (mut kept, mut true_poses) = (Vec::new(), Vec::new());
     let (mut outside_span, mut in_gaps) = (0, 0);
-    for (&stamp_ns, pose) in estimate.stamps_ns.iter().zip(estimate.poses) {
+    for (&stamp_ns, pose) in estimate.stamps().iter().zip(&estimate.poses) {
         match truth_at(truth, stamp_ns, max_gap_ns) {
             At::Pose(true_pose) => {
                 kept.push(*pose);
@@ -115,7 +94,7 @@ fn by_time(
             let [first_s, last_s] = ends.map(|ns| ns as f64 * 1e-9);
             format!("{first_s:.3} s to {last_s:.3} s")
         };
-        let (estimate, truth) = (span_s(estimate.stamps_ns), span_s(truth.stamps_ns));
+        let (estimate, truth) = (span_s(estimate.stamps()), span_s(truth.stamps()));
         return Err(EvaluationError(format!(
             "the trajectories do not overlap in time: estimate {estimate}, ground truth {truth} (same clock, same unit?)"
         )));
@@ -134,11 +113,8 @@ fn by_time(
 }
 
 /// Refuses a wrong count of stamps, and stamps that decrease.
-pub(crate) fn require_stamps(
-    side: &str,
-    trajectory: &TimedPoses<'_>,
-) -> Result<(), EvaluationError> {
-    let (stamps, poses) = (trajectory.stamps_ns, trajectory.poses.len());
+pub(crate) fn require_stamps(side: &str, trajectory: &Trajectory) -> Result<(), EvaluationError> {
+    let (stamps, poses) = (trajectory.stamps(), trajectory.poses.len());
     if stamps.len() != poses {
         let stamps = stamps.len();
         return Err(EvaluationError(format!(
@@ -166,22 +142,23 @@ const ROUNDING_NS: u64 = 1_000;
 
 /// Returns the ground truth at `stamp_ns`. A stamp that the ground truth has itself is never in a
 /// gap.
-pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
-    let ends = [truth.stamps_ns.first(), truth.stamps_ns.last()];
+pub(crate) fn truth_at(truth: &Trajectory, stamp_ns: i64, max_gap_ns: i64) -> At {
+    let stamps_ns = truth.stamps();
+    let ends = [stamps_ns.first(), stamps_ns.last()];
     let is_end = |end: &&i64| stamp_ns.abs_diff(**end) <= ROUNDING_NS;
     let stamp_ns = *ends.into_iter().flatten().find(is_end).unwrap_or(&stamp_ns);
-    let after = truth.stamps_ns.partition_point(|&t| t <= stamp_ns);
+    let after = stamps_ns.partition_point(|&t| t <= stamp_ns);
     let Some(before) = after.checked_sub(1) else {
         return At::Outside;
     };
-    if truth.stamps_ns[before] == stamp_ns {
+    if stamps_ns[before] == stamp_ns {
         return At::Pose(truth.poses[before]);
     }
-    let Some(&after_ns) = truth.stamps_ns.get(after) else {
+    let Some(&after_ns) = stamps_ns.get(after) else {
         return At::Outside;
     };
     // i128: any two stamps may lie further apart than an i64 can hold.
-    let since = |t: i64| i128::from(t) - i128::from(truth.stamps_ns[before]);
+    let since = |t: i64| i128::from(t) - i128::from(stamps_ns[before]);
     if since(after_ns) > i128::from(max_gap_ns) {
         return At::Gap;
     }
@@ -192,7 +169,6 @@ pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) ->
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
     use std::f64::consts::PI;
@@ -203,6 +179,13 @@ mod tests {
         (0..n).map(|k| pose(k as f64, 0.0, 0.0)).collect()
     }
 
+    fn timed(stamps_ns: &[i64], poses: &[Pose]) -> Trajectory {
+        Trajectory {
+            stamp_ns: Some(stamps_ns.to_vec()),
+            poses: poses.to_vec(),
+        }
+    }
+
     fn seconds(s: &[f64]) -> Vec<i64> {
         s.iter().map(|s| (s * SECOND as f64) as i64).collect()
     }
@@ -211,18 +194,16 @@ mod tests {
         estimate_ns: &[i64],
         truth_ns: &[i64],
     ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
-        let (estimate, truth) = (line(estimate_ns.len()), line(truth_ns.len()));
-        let estimate = TimedPoses::new(estimate_ns, &estimate);
-        let truth = TimedPoses::new(truth_ns, &truth);
-        associate(estimate, truth)
+        let line = |stamps_ns: &[i64]| timed(stamps_ns, &line(stamps_ns.len()));
+        associate(&line(estimate_ns), &line(truth_ns))
     }
 
     #[test]
     fn the_ground_truth_is_interpolated_where_the_yaw_wraps() {
         let truth = [pose(0.0, 0.0, PI - 0.1), pose(4.0, 2.0, -PI + 0.3)];
         let (matched, _) = associate(
-            TimedPoses::new(&seconds(&[10.0, 10.25, 11.0]), &line(3)),
-            TimedPoses::new(&seconds(&[10.0, 11.0]), &truth),
+            &timed(&seconds(&[10.0, 10.25, 11.0]), &line(3)),
+            &timed(&seconds(&[10.0, 11.0]), &truth),
         )
         .unwrap();
         let between = matched.truth()[1];
@@ -262,9 +243,8 @@ mod tests {
 
     #[test]
     fn association_by_index_cuts_the_longer_trajectory_and_counts() {
-        let (estimate, truth) = (line(3), line(5));
-        let (estimate, truth) = (TimedPoses::untimed(&estimate), TimedPoses::untimed(&truth));
-        let (matched, coverage) = associate(estimate, truth).unwrap();
+        let [estimate, truth] = [3, 5].map(|n| timed(&[], &line(n)));
+        let (matched, coverage) = associate(&estimate, &truth).unwrap();
         let expected = Coverage::Index {
             matched: 3,
             estimate_surplus: 0,
@@ -287,10 +267,9 @@ mod tests {
         ] {
             assert!(refused.contains(words), "{refused}");
         }
-        let (poses, empty) = (line(3), TimedPoses::untimed(&[]));
-        let short = TimedPoses::new(&two, &poses);
-        let refused = associate(short, short).unwrap_err();
+        let (short, empty) = (timed(&two, &line(3)), Trajectory::default());
+        let refused = associate(&short, &short).unwrap_err();
         assert!(refused.0.contains("estimate has 3 poses but 2 stamps"));
-        assert!(associate(empty, empty).is_err());
+        assert!(associate(&empty, &empty).is_err());
     }
 }

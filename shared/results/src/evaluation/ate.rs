@@ -81,7 +81,6 @@ fn serialize_isometry<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

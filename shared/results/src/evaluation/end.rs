@@ -32,7 +32,6 @@ pub fn end_error(matched: &MatchedPoses) -> EndError {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

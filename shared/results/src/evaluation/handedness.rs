@@ -211,7 +211,6 @@ impl fmt::Display for Axes {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

@@ -33,7 +33,6 @@ pub fn loop_errors(pairs: impl IntoIterator<Item = (Pose, Pose)>) -> Option<Loop
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

@@ -105,7 +105,6 @@ pub fn path_m(poses: &[Pose]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, UncertainMotion, xy_yaw};
+use gyre_radar::Trajectory;
 
 use crate::evaluation::{
-    EvaluationError, TimedPoses,
+    EvaluationError,
     associate::{At, require_stamps, truth_at},
     error::{ESTIMATE, TRUTH},
     matched::require_poses,
@@ -60,11 +61,11 @@ impl MatchedMotions {
     /// `max_gap_ns`.
     pub fn new(
         motions: &[TimedMotion],
-        truth: TimedPoses<'_>,
+        truth: &Trajectory,
         max_gap_ns: i64,
     ) -> Result<Self, EvaluationError> {
-        require_poses(TRUTH, truth.poses)?;
-        require_stamps(TRUTH, &truth)?;
+        require_poses(TRUTH, &truth.poses)?;
+        require_stamps(TRUTH, truth)?;
         require_motions(motions)?;
         let at = |stamp_ns| match truth_at(truth, stamp_ns, max_gap_ns) {
             At::Pose(pose) => Some(pose),
@@ -166,7 +167,6 @@ fn require_motions(motions: &[TimedMotion]) -> Result<(), EvaluationError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use nalgebra::Matrix3;
 
     use super::*;
@@ -191,9 +191,12 @@ mod tests {
         motions: &[TimedMotion],
         truth_ms: &[i64],
     ) -> Result<MatchedMotions, EvaluationError> {
-        let poses: Vec<_> = truth_ms.iter().map(|&t| pose(t as f64, 0.0, 0.0)).collect();
-        let stamps: Vec<_> = truth_ms.iter().map(|t| t * MS).collect();
-        MatchedMotions::new(motions, TimedPoses::new(&stamps, &poses), 20 * MS)
+        let at = |&t: &i64| pose(t as f64, 0.0, 0.0);
+        let truth = Trajectory {
+            stamp_ns: Some(truth_ms.iter().map(|t| t * MS).collect()),
+            poses: truth_ms.iter().map(at).collect(),
+        };
+        MatchedMotions::new(motions, &truth, 20 * MS)
     }
 
     #[test]

@@ -30,7 +30,6 @@ pub(crate) fn heading_offset_rad(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::evaluation::ate::align;
     use gyre_geometry::pose;

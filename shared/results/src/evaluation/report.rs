@@ -3,12 +3,12 @@
 use std::num::NonZeroUsize;
 
 use gyre_geometry::Pose;
+use gyre_radar::Trajectory;
 use serde::Serialize;
 
 use crate::evaluation::{
-    Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg, TimedPoses,
-    associate, ate, end_error, handedness::resolve_axes, kitti, mounting::heading_offset_rad, rpe,
-    seg,
+    Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg, associate, ate,
+    end_error, handedness::resolve_axes, kitti, mounting::heading_offset_rad, rpe, seg,
 };
 
 /// Poses from the start of a segment of KITTI and seg to the start of the next; published figures
@@ -51,8 +51,8 @@ pub struct Evaluation {
 ///
 /// A path that is too short for KITTI is not an error.
 pub fn evaluate(
-    estimate: TimedPoses<'_>,
-    truth: TimedPoses<'_>,
+    estimate: &Trajectory,
+    truth: &Trajectory,
     step: NonZeroUsize,
 ) -> Result<Evaluation, EvaluationError> {
     let (matched, coverage) = associate(estimate, truth)?;
@@ -96,13 +96,15 @@ fn extent_m(poses: &[Pose]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 
     fn evaluated(estimate: &[Pose], truth: &[Pose]) -> Evaluation {
-        let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
-        evaluate(estimate, truth, STEP).unwrap()
+        let [estimate, truth] = [estimate, truth].map(|poses| Trajectory {
+            stamp_ns: None,
+            poses: poses.to_vec(),
+        });
+        evaluate(&estimate, &truth, STEP).unwrap()
     }
 
     #[test]

@@ -75,7 +75,6 @@ impl MotionRow {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_contract::{
         Item, MotionEstimate, PoseHeader, RefinementRecord, initial_guess, outcome,
     };

@@ -55,7 +55,6 @@ impl Sketch {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use crate::evaluation::path_m;
     use gyre_geometry::pose;
 

@@ -118,7 +118,6 @@ impl Summary {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::time::Duration;
 
     use gyre_configuration::Configuration;

@@ -4,12 +4,16 @@
 use std::num::NonZeroUsize;
 
 use gyre_geometry::{Pose, pose};
-use gyre_results::evaluation::{Evaluation, TimedPoses, evaluate};
+use gyre_radar::Trajectory;
+use gyre_results::evaluation::{Evaluation, evaluate};
 use proptest::prelude::*;
 
 pub fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
-    let [estimate, truth] = [estimate, truth].map(TimedPoses::untimed);
-    evaluate(estimate, truth, NonZeroUsize::new(step).unwrap()).unwrap()
+    let [estimate, truth] = [estimate, truth].map(|poses| Trajectory {
+        stamp_ns: None,
+        poses: poses.to_vec(),
+    });
+    evaluate(&estimate, &truth, NonZeroUsize::new(step).unwrap()).unwrap()
 }
 
 /// Returns the poses of motions from `start`.

@@ -139,7 +139,6 @@ impl Given {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn given(words: &[&Path]) -> Result<Given, Failure> {

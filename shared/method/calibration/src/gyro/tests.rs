@@ -1,5 +1,3 @@
-#![allow(clippy::unwrap_used)]
-
 use gyre_geometry::samples::{GyroConfig, Sample, SampleKind, UpAxis};
 use proptest::prelude::*;
 

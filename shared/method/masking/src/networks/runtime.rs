@@ -211,7 +211,6 @@ pub fn session(environment: &Environment, threads: usize) -> ort::Result<Session
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn folder_with(file: &str) -> (tempfile::TempDir, PathBuf) {

@@ -10,7 +10,7 @@ use std::{
 
 use crate::common::{backends, card, learned, learned_by, raster, runtime_is_installed};
 use gyre_masking::networks::runtime::INSTALL;
-use gyre_masking::{Backend, MaskingConfig, Provider, model::Card, network::Network};
+use gyre_masking::{MaskingConfig, model::Card, network::Network};
 use gyre_radar::{RasterConfig, Sampling};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
@@ -146,39 +146,11 @@ fn a_missing_runtime_is_reported_with_the_install_command() {
     rejected(&config, &raster(), &words);
 }
 
-#[test]
-fn settings_of_onnx_runtime_are_rejected_for_rten() {
-    let rten = || learned_by(Backend::Rten, &card("single-31"));
-    let runtime = MaskingConfig {
-        runtime: Some(PathBuf::from("/anywhere")),
-        ..rten()
-    };
-    let provider = MaskingConfig {
-        provider: Provider::Cuda,
-        ..rten()
-    };
-    for (config, key) in [(runtime, "runtime"), (provider, "provider")] {
-        let sentence = config.validate().unwrap_err().to_string();
-        let words = format!("{key} is a setting of ONNX Runtime");
-        assert!(sentence.contains(&words), "{sentence}");
-    }
-}
-
-#[test]
-fn unknown_backends_are_rejected_with_the_known_ones() {
-    let read = |text: &str| toml::from_str::<MaskingConfig>(text);
-    for name in ["tract", "onyx"] {
-        let sentence = read(&format!("backend = \"{name}\"")).unwrap_err();
-        let words = format!("unknown variant `{name}`, expected one of `auto`");
-        assert!(sentence.to_string().contains(&words), "{sentence}");
-    }
-    assert_eq!(read("backend = \"rten\"").unwrap().backend, Backend::Rten);
-    assert_eq!(read("").unwrap().backend, Backend::Auto);
-}
-
 #[cfg(not(any(feature = "cuda", feature = "tensorrt", feature = "openvino")))]
 #[test]
 fn a_provider_that_is_not_built_in_is_reported_with_its_feature() {
+    use gyre_masking::Provider;
+
     if !runtime_is_installed() {
         return;
     }

@@ -187,8 +187,6 @@ fn of_prediction(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
-
     use std::f64::consts::TAU;
 
     use super::*;

@@ -2,7 +2,7 @@
 //! scans clockwise.
 
 use gyre_geometry::{
-    ComposedMotion, Pose, SparsePoint,
+    ComposedMotion, Pose, SparsePoint, pose,
     samples::{GyroTurn, WheelDistance},
 };
 use gyre_matching::{Aiding, Refined, RefinementConfig, Refiner};
@@ -101,6 +101,14 @@ impl Drive {
     pub fn pose(&self, k: usize) -> Pose {
         let time_s = k as f64 * SWEEP_S;
         arc(self.length_m(time_s), self.yaw_rate_radps * time_s)
+    }
+}
+
+/// A vehicle that slows down from 10 m/s.
+pub fn slower(scans: usize) -> Drive {
+    Drive {
+        acceleration_mps2: -0.2,
+        ..Drive::steady(10.0, 0.0, scans)
     }
 }
 
@@ -263,6 +271,21 @@ pub fn searched(drive: &Drive, k: usize) -> Pose {
     let mut numbers = Numbers(0x5ea2c4 + k as u64);
     let off = Vector3::from_fn(|_, _| numbers.within(1.0));
     true_motion(drive, k) * Pose::new(off.xy() * 0.25, off.z * 0.5_f64.to_radians())
+}
+
+/// A search that finds any way from scan `inside` on.
+pub fn search_until(inside: usize, drive: &Drive) -> impl FnMut(usize) -> Pose {
+    let mut numbers = Numbers(7);
+    move |k| match k < inside {
+        true => searched(drive, k - 1),
+        false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
+    }
+}
+
+/// The scans to which these motions lead, of motions from scan 0 on.
+pub fn scans_where(refined: &[Refined], is_one: impl Fn(&Refined) -> bool) -> Vec<usize> {
+    let ones = (1..).zip(refined).filter(|(_, it)| is_one(it));
+    ones.map(|(k, _)| k).collect()
 }
 
 /// The displacement over scans by the motions against the true one, and its standard deviation

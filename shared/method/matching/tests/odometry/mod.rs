@@ -1,7 +1,5 @@
 //! Odometry of whole drives. One program, so that all of it is linked once.
 
-#![allow(clippy::unwrap_used)]
-
 mod covariances;
 mod examples;
 mod sample_faults;

@@ -26,7 +26,6 @@ const RINGING_M: f32 = 2.5;
 pub(super) struct Rows {
     pub layout: Layout,
     powers: Vec<f32>,
-    bins: Vec<u8>,
     sums: Vec<u16>,
 }
 
@@ -83,11 +82,10 @@ impl Rows {
         let bins = first_bin..first_bin + all * layout.bins_per_cell;
         let floor = median(scan, bins.clone()).saturating_add(ABOVE_MEDIAN);
         let floor = u16::from(floor) * layout.bins_per_cell as u16;
-        self.bins.resize(bins.len(), 0);
         self.sums.resize(all, 0);
         for (azimuth, powers) in self.powers.chunks_exact_mut(stride).enumerate() {
             let row = &scan.row(azimuth)[bins.clone()];
-            sum_pieces(row, 0, layout.bins_per_cell, &mut self.bins, &mut self.sums);
+            sum_pieces(row, layout.bins_per_cell, &mut self.sums);
             let cells = &mut powers[REACH - before..REACH - before + all];
             for (cell, sum) in cells.iter_mut().zip(&self.sums) {
                 *cell = f32::from(sum.saturating_sub(floor));

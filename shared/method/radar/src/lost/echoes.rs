@@ -64,7 +64,6 @@ pub(super) struct Echoes {
     rows: Vec<Row>,
     cells: Vec<u16>,
     powers: Vec<f32>,
-    bins: Vec<u8>,
     sums: Vec<u16>,
 }
 
@@ -87,19 +86,12 @@ impl Echoes {
             ..
         } = self.layout;
         let bins = cells * bins_per_cell;
-        self.bins.resize(bins, 0);
         let room = cells.next_multiple_of(BLOCK);
         self.sums.clear();
         self.sums.resize(room, 0);
         for row in 0..azimuths - super::stale_rows(scan) {
             let powers = &scan.row(row)[first_bin..][..bins];
-            sum_pieces(
-                powers,
-                0,
-                bins_per_cell,
-                &mut self.bins,
-                &mut self.sums[..cells],
-            );
+            sum_pieces(powers, bins_per_cell, &mut self.sums[..cells]);
             let start = self.powers.len();
             self.cells.resize(start + room, 0);
             self.powers.resize(start + room, 0.0);

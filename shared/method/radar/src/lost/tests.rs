@@ -1,5 +1,3 @@
-#![allow(clippy::unwrap_used)]
-
 use std::{collections::BTreeSet, f64::consts::TAU};
 
 use gyre_geometry::{

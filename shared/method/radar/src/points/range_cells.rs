@@ -15,7 +15,6 @@ pub(super) struct RangeCells {
     pub layout: Layout,
     /// Row-major, one row per azimuth.
     powers: Vec<i16>,
-    bins: Vec<u8>,
     sums: Vec<u16>,
     /// True if each azimuth was measured and has a power above the floor.
     active: Vec<bool>,
@@ -63,14 +62,13 @@ impl RangeCells {
         let azimuths = scan.geometry.azimuths;
         let floor = i16::from(floor) * bins_per_cell as i16;
         self.powers.resize(azimuths * cells, 0);
-        self.bins.resize(cells * bins_per_cell, 0);
         self.sums.resize(cells, 0);
         self.active.clear();
         self.active.resize(azimuths, false);
         let measured = |azimuth: &usize| scan.flags[*azimuth] & flag::MEASURED != 0;
         for azimuth in (0..azimuths).filter(|it| cells > 0 && measured(it)) {
             let bins = &scan.row(azimuth)[skipped * bins_per_cell..][..cells * bins_per_cell];
-            sum_pieces(bins, 0, bins_per_cell, &mut self.bins, &mut self.sums);
+            sum_pieces(bins, bins_per_cell, &mut self.sums);
             let powers = &mut self.powers[azimuth * cells..][..cells];
             for (power, sum) in powers.iter_mut().zip(&self.sums) {
                 *power = (*sum as i16 - floor).max(0);

@@ -97,14 +97,10 @@ impl PolarImage {
         let first = layout.lead() + reach;
         for azimuth in 0..layout.azimuths {
             let powers = &scan.row(azimuth)[..bins];
+            let above_floor = &mut self.above_floor[..bins];
+            window::subtract_floor(powers, floor, above_floor);
             let sums = &mut self.pieces[first..first + pieces];
-            window::sum_pieces(
-                powers,
-                floor,
-                layout.window.bins_per_piece,
-                &mut self.above_floor,
-                sums,
-            );
+            window::sum_pieces(above_floor, layout.window.bins_per_piece, sums);
             let row = &mut self.samples[azimuth * stride..][..stride];
             let Some(motion) = motion else {
                 window::average(&self.pieces, &layout.window, &mut row[..columns]);

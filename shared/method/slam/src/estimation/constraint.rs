@@ -120,7 +120,6 @@ pub fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use gyre_geometry::pose;
 

@@ -151,7 +151,6 @@ impl DriveSearch {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_geometry::pose;
 
     use super::*;

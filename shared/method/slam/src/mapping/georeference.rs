@@ -85,7 +85,6 @@ fn convergence(latitude: f64, longitude: f64, zone: u8) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn georeference([latitude_deg, longitude_deg, heading_deg]: [f64; 3]) -> Georeference {

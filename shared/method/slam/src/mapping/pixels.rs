@@ -2,7 +2,7 @@
 
 use png::{BitDepth, ColorType};
 
-use crate::mapping::{Cell, MapError};
+use crate::mapping::{Cell, MapError, TILE_CELLS, TileImage};
 
 /// Encodes rows of pixels of 8 bits a channel.
 pub fn encode(width: usize, color: ColorType, pixels: &[u8]) -> Result<Vec<u8>, MapError> {
@@ -20,9 +20,33 @@ pub fn encode(width: usize, color: ColorType, pixels: &[u8]) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
+/// Draws a tile with one pixel for each block of cells, into rows of `width` pixels from
+/// `[left, top]` on.
+pub fn draw(
+    image: &TileImage,
+    block: usize,
+    pixels: &mut [Cell],
+    width: usize,
+    [left, top]: [usize; 2],
+) {
+    let side = TILE_CELLS / block;
+    for row in 0..side {
+        let first = (top + row) * width + left;
+        for (column, pixel) in pixels[first..first + side].iter_mut().enumerate() {
+            let first = row * block * TILE_CELLS + column * block;
+            let cells = (0..block).flat_map(|k| &image.cells[first + k * TILE_CELLS..][..block]);
+            *pixel = match block {
+                // Most pictures have a pixel for each cell.
+                1 => image.cells[first],
+                _ => unite(cells.copied()),
+            };
+        }
+    }
+}
+
 /// Unites a block of cells: evidence half way between the mean and the highest, so that thin walls
 /// stay visible, and the mean look.
-pub fn unite(cells: impl Iterator<Item = Cell> + Clone) -> Cell {
+fn unite(cells: impl Iterator<Item = Cell> + Clone) -> Cell {
     let count = cells.clone().count().max(1) as u32;
     let sum = |value: fn(Cell) -> u8| {
         cells

@@ -151,7 +151,6 @@ impl TileStore {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn index(x: i32) -> TileIndex {

@@ -1,9 +1,7 @@
 //! Trajectories, graphs and places as their users call them. One program, so that all of it is
 //! linked once.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
+pub mod common;
 
 mod consistency;
 mod filter;

@@ -1,14 +1,14 @@
 //! Measured positions in a frame of their own: the least-squares solution, its covariance, wrong
 //! positions.
 
-use gyre_geometry::{Pose, UncertainMotion, pose, xy_yaw};
+use gyre_geometry::{Pose, UncertainMotion, pose};
 use gyre_slam::estimation::{GraphOptions, Kernel, PoseGraph, Position};
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Vector2, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::common::{Drive, ODOMETRY};
+use super::common::{Drive, ODOMETRY, moved};
 
 const KEYFRAMES: usize = 120;
 const SIGMA_M: f64 = 1.5;
@@ -68,12 +68,6 @@ fn cost(drive: &Drive, positions: &[Position], poses: &[Pose], frame: &Pose) -> 
     0.5 * motions.chain(positions).sum::<f64>()
 }
 
-fn moved(at: &Pose, axis: usize, step: f64) -> Pose {
-    let mut values = xy_yaw(at);
-    values[axis] += step;
-    pose(values[0], values[1], values[2])
-}
-
 #[test]
 fn the_solution_is_where_no_pose_lowers_the_sum_of_squares() {
     let drive = Drive::new(KEYFRAMES, 60, ODOMETRY, 5);
@@ -87,7 +81,8 @@ fn the_solution_is_where_no_pose_lowers_the_sum_of_squares() {
     for axis in 0..3 {
         let step = 1e-4;
         let slope = |of: &dyn Fn(f64) -> f64| (of(step) - of(-step)) / (2.0 * step);
-        let by_frame = |step| cost(&drive, &positions, &poses, &moved(&frame, axis, step));
+        let by = |step: f64| Vector3::ith(axis, step);
+        let by_frame = |step| cost(&drive, &positions, &poses, &moved(&frame, &by(step)));
         // In units of a standard deviation: sqrt of the curvature.
         let curvature = (by_frame(step) + by_frame(-step) - 2.0 * at_solution) / (step * step);
         assert!(
@@ -97,7 +92,7 @@ fn the_solution_is_where_no_pose_lowers_the_sum_of_squares() {
         for keyframe in [1, 40, KEYFRAMES - 1] {
             let by_pose = |step| {
                 let mut poses = poses.clone();
-                poses[keyframe] = moved(&poses[keyframe], axis, step);
+                poses[keyframe] = moved(&poses[keyframe], &by(step));
                 cost(&drive, &positions, &poses, &frame)
             };
             let curvature = (by_pose(step) + by_pose(-step) - 2.0 * at_solution) / (step * step);

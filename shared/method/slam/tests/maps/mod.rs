@@ -1,5 +1,4 @@
 //! Maps of scenes whose look is known.
-#![allow(clippy::unwrap_used)]
 
 mod evidence;
 mod files;

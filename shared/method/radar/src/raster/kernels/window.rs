@@ -53,27 +53,25 @@ impl Window {
     }
 }
 
-/// Writes the piecewise sums of the powers above the floor. `above_floor` is scratch memory.
+/// Writes by how much each power is above the floor.
 #[simd]
-pub fn sum_pieces(
-    powers: &[u8],
-    floor: u8,
-    bins_per_piece: usize,
-    above_floor: &mut [u8],
-    pieces: &mut [u16],
-) {
-    let above_floor = &mut above_floor[..powers.len()];
+pub fn subtract_floor(powers: &[u8], floor: u8, above_floor: &mut [u8]) {
     for (above, &power) in above_floor.iter_mut().zip(powers) {
         *above = power.saturating_sub(floor);
     }
+}
+
+/// Writes the piecewise sums of bins.
+#[simd]
+pub fn sum_pieces(bins: &[u8], bins_per_piece: usize, pieces: &mut [u16]) {
     match bins_per_piece {
-        1 => sum_each(above_floor, pieces, |[a]: [u8; 1]| u16::from(a)),
-        2 => sum_each(above_floor, pieces, sum_2),
-        3 => sum_each(above_floor, pieces, |bins: [u8; 3]| {
+        1 => sum_each(bins, pieces, |[a]: [u8; 1]| u16::from(a)),
+        2 => sum_each(bins, pieces, sum_2),
+        3 => sum_each(bins, pieces, |bins: [u8; 3]| {
             bins.map(u16::from).iter().sum()
         }),
-        4 => sum_each(above_floor, pieces, sum_4),
-        _ => sum_long(above_floor, bins_per_piece, pieces),
+        4 => sum_each(bins, pieces, sum_4),
+        _ => sum_long(bins, bins_per_piece, pieces),
     }
 }
 
@@ -203,14 +201,10 @@ mod tests {
         let reach = window.reach();
         let count = bins.len().div_ceil(window.bins_per_piece);
         let mut pieces = vec![0; count + 2 * reach];
-        let mut scratch = vec![0; bins.len()];
-        sum_pieces(
-            bins,
-            floor,
-            window.bins_per_piece,
-            &mut scratch,
-            &mut pieces[reach..reach + count],
-        );
+        let mut above_floor = vec![0; bins.len()];
+        subtract_floor(bins, floor, &mut above_floor);
+        let sums = &mut pieces[reach..reach + count];
+        sum_pieces(&above_floor, window.bins_per_piece, sums);
         let mut out = vec![0; count];
         average(&pieces, window, &mut out);
         out

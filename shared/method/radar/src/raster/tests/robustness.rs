@@ -7,10 +7,6 @@ use gyre_geometry::{
 use nalgebra::Point2;
 use ndarray::{Array2, ArrayViewMut2, s};
 use proptest::prelude::*;
-use serde::{
-    Deserialize,
-    de::value::{Error as ValueError, MapDeserializer},
-};
 
 use super::scene::{STAMP_NS, Sensor, raster};
 use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling};
@@ -141,25 +137,10 @@ fn motions_out_of_bounds_are_rejected() {
 }
 
 #[test]
-fn settings_out_of_bounds_and_unknown_ones_are_rejected_by_name() {
-    let read = |key: &'static str, value: f32| {
-        let entries = MapDeserializer::<_, ValueError>::new([(key, value)].into_iter());
-        RasterConfig::deserialize(entries)
-    };
-    let expected = RasterConfig {
-        cell_m: 0.4,
-        ..RasterConfig::default()
-    };
-    assert_eq!(read("cell_m", 0.4).unwrap(), expected);
-    let unknown = read("cel_m", 0.4).unwrap_err();
-    assert!(unknown.to_string().contains("cel_m"));
-    let wrong = [("cell_m", f32::NAN), ("min_range_m", -1.0)];
-    let none = RasterConfig { n: 0, ..expected };
-    let wrong = wrong.map(|(key, value)| (key, read(key, value).unwrap()));
-    for (key, config) in wrong.into_iter().chain([("n", none)]) {
-        let rejected = Rasteriser::new(&config).unwrap_err().to_string();
-        assert!(rejected.starts_with(&format!("raster.{key} is ")));
-    }
+fn settings_out_of_bounds_are_rejected_by_name() {
+    let empty = RasterConfig { n: 0, ..small() };
+    let rejected = Rasteriser::new(&empty).unwrap_err().to_string();
+    assert!(rejected.starts_with("raster.n is "));
 }
 
 #[test]

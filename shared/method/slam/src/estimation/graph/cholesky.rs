@@ -245,8 +245,6 @@ fn solve_upper(l: &Matrix3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
-
     use nalgebra::DMatrix;
     use proptest::prelude::*;
 

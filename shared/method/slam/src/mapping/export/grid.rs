@@ -72,7 +72,6 @@ fn unite(one: u8, other: u8) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use crate::mapping::{Cell, TileIndex};
 
     use super::*;

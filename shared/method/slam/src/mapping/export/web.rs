@@ -6,8 +6,8 @@ use gyre_storage::{Draft, create_folder};
 use png::ColorType;
 
 use crate::mapping::{
-    Cell, MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSource,
-    pixels::{encode, overlay, unite},
+    MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSource,
+    pixels::{draw, encode, overlay},
 };
 
 /// The deepest pyramid: 30,000 km of tiles on a side.
@@ -92,25 +92,10 @@ impl<S: TileSource> Pyramid<'_, S> {
         for (right, down) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             if let Some(part) = self.build(zoom + 1, 2 * x + right, 2 * y + down)? {
                 let quarter = [right as usize, down as usize].map(|k| k * TILE_CELLS / 2);
-                halve(&part, image.get_or_insert_default(), quarter);
+                let whole: &mut TileImage = image.get_or_insert_default();
+                draw(&part, 2, &mut whole.cells, TILE_CELLS, quarter);
             }
         }
         Ok(image)
-    }
-}
-
-/// Draws a tile at half its size into a quarter of a coarser tile.
-fn halve(part: &TileImage, whole: &mut TileImage, [left, top]: [usize; 2]) {
-    let half = TILE_CELLS / 2;
-    for (row, pair) in part.cells.chunks_exact(2 * TILE_CELLS).enumerate() {
-        let (above, below) = pair.split_at(TILE_CELLS);
-        let first = (top + row) * TILE_CELLS + left;
-        let cells: &mut [Cell] = &mut whole.cells[first..first + half];
-        for (k, cell) in cells.iter_mut().enumerate() {
-            let block = above[2 * k..2 * k + 2]
-                .iter()
-                .chain(&below[2 * k..2 * k + 2]);
-            *cell = unite(block.copied());
-        }
     }
 }

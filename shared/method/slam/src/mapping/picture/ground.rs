@@ -33,12 +33,7 @@ impl Ground {
             source.read(tile, &mut image)?;
             let left = tile.x.abs_diff(extent.min.x) as usize * side;
             let top = tile.y.abs_diff(extent.max.y) as usize * side;
-            for row in 0..side {
-                let first = (top + row) * width + left;
-                for (column, cell) in cells[first..first + side].iter_mut().enumerate() {
-                    *cell = united(&image, [column, row], block);
-                }
-            }
+            pixels::draw(&image, block, &mut cells, width, [left, top]);
         }
         let cell_m = source.cell_m();
         let above = TileIndex {
@@ -78,14 +73,4 @@ impl Ground {
             pixel_m: self.pixel_m,
         }
     }
-}
-
-fn united(image: &TileImage, [column, row]: [usize; 2], block: usize) -> Cell {
-    let first = row * block * TILE_CELLS + column * block;
-    // Most pictures have a pixel for each cell.
-    if block == 1 {
-        return image.cells[first];
-    }
-    let cells = (0..block).flat_map(|k| &image.cells[first + k * TILE_CELLS..][..block]);
-    pixels::unite(cells.copied())
 }

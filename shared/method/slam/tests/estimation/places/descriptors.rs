@@ -4,16 +4,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use gyre_geometry::{Pose, pose, wrap_angle};
 use gyre_matching::Submap;
-use gyre_slam::estimation::places::{Describer, Descriptor, OrderError, PlaceIndex};
+use gyre_slam::estimation::places::{Descriptor, OrderError, PlaceIndex};
 use proptest::prelude::*;
 
-use super::scenes;
-
-fn describe(submap: &Submap) -> Descriptor {
-    let mut descriptor = Descriptor::default();
-    Describer::new().describe(submap, &mut descriptor);
-    descriptor
-}
+use super::scenes::{self, describe};
 
 fn index_of(descriptors: &[Descriptor]) -> PlaceIndex {
     let mut index = PlaceIndex::default();

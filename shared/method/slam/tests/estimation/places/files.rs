@@ -3,27 +3,16 @@
 use std::{fs, path::Path};
 
 use gyre_geometry::pose;
-use gyre_slam::estimation::places::{Describer, Descriptor, PlaceIndex};
+use gyre_slam::estimation::places::PlaceIndex;
 
 use super::scenes;
 
-fn descriptors() -> Vec<Descriptor> {
-    let mut describer = Describer::new();
-    let seen = |seed| scenes::seen(&scenes::place(seed), &pose(0.0, 0.0, 0.1 * seed as f64));
-    let describe = |seed| {
-        let mut descriptor = Descriptor::default();
-        describer.describe(&seen(seed), &mut descriptor);
-        descriptor
-    };
-    (0..4).map(describe).collect()
-}
-
 fn saved(path: &Path) -> PlaceIndex {
     let mut index = PlaceIndex::default();
-    for (k, descriptor) in descriptors().iter().enumerate() {
-        index
-            .insert(10 + k as u64, 2.5 * k as f64, descriptor)
-            .unwrap();
+    for k in 0..4 {
+        let seen = scenes::seen(&scenes::place(k), &pose(0.0, 0.0, 0.1 * k as f64));
+        let descriptor = scenes::describe(&seen);
+        index.insert(10 + k, 2.5 * k as f64, &descriptor).unwrap();
     }
     index.save(path).unwrap();
     index

@@ -2,6 +2,7 @@
 
 use gyre_geometry::{Pose, SparsePoint, Twist};
 use gyre_matching::Submap;
+use gyre_slam::estimation::places::{Describer, Descriptor};
 use nalgebra::Point2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -37,4 +38,10 @@ pub fn seen(place: &[[f64; 2]], sensor: &Pose) -> Submap {
     let mut submap = Submap::default();
     submap.start(&points, &Twist::default());
     submap
+}
+
+pub fn describe(submap: &Submap) -> Descriptor {
+    let mut descriptor = Descriptor::default();
+    Describer::new().describe(submap, &mut descriptor);
+    descriptor
 }
