@@ -4,19 +4,10 @@
 //! The tests that start it need its requirements in the Python that `GYRE_PYTHON` names, else in
 //! `python3`.
 
-use std::{
-    collections::BTreeMap,
-    mem::{offset_of, size_of},
-    process::Command,
-};
+use std::process::Command;
 
-use gyre_contract::{
-    ByteBlock, FloatBlock, Hop, Item, MaskedHeader, MotionEstimate, MotionHeader, PoseHeader,
-    RefinementRecord, RotationEstimate, ScanHeader,
-};
-use gyre_geometry::samples::{DopplerVelocity, GyroTurn, WheelDistance};
+use gyre_contract::layout::Layout;
 use rustix::process::Signal;
-use serde_json::Value;
 
 use crate::{
     PROJECT,
@@ -42,64 +33,20 @@ pub fn with_python(run: Run) -> Run {
     run.set(&format!("stages.masking.command=['{python}', '{script}']"))
 }
 
-/// The names of messages with their sizes and the offsets of their fields.
-macro_rules! layouts {
-    ($($name:ident $message:ty: $($field:ident)*;)*) => {
-        [$((
-            stringify!($name),
-            size_of::<$message>(),
-            BTreeMap::from([$((stringify!($field), offset_of!($message, $field))),*]),
-        )),*]
-    };
-}
-
-fn layouts() -> [(&'static str, usize, BTreeMap<&'static str, usize>); 12] {
-    layouts! {
-        gyre_hop_v1 Hop: received_ns started_ns finished_ns published_ns;
-        gyre_item_v6 Item: seq scan previous_scan published numbered_from stamp_ns due_ns generation
-            flags lost hops;
-        gyre_scan_header_v7 ScanHeader: item azimuths bins stride first_byte range_resolution_m
-            range_offset_m clockwise doppler_s samples samples_left_out azimuth_stamp_ns azimuth_rad
-            azimuth_flags;
-        gyre_masked_header_v9 MaskedHeader: item n rasters cell_m mask twist compensated points
-            azimuth_variance_rad2 gyro has_gyro wheels has_wheels doppler has_doppler;
-        gyre_gyro_turn_v1 GyroTurn: yaw_rad variance_rad2 interval_s sweep_rate_radps;
-        gyre_wheel_distance_v1 WheelDistance: distance_m variance_m2 side_variance_m2 interval_s;
-        gyre_doppler_velocity_v1 DopplerVelocity: velocity_mps covariance bearings;
-        gyre_rotation_estimate_v1 RotationEstimate: angle_rad variance_rad2 score runner_up_rad
-            runner_up_score;
-        gyre_refinement_v6 RefinementRecord: outcome initial_guess overlap support stationary gyro
-            gyro_turn_rad gyro_scale gyro_bias_radps gyro_bias_sigma_radps wheels wheel_distance_m
-            wheel_scale wheel_scale_sigma doppler doppler_scale doppler_scale_sigma;
-        gyre_motion_estimate_v8 MotionEstimate: x_m y_m yaw_rad covariance drift_share scale_sigma
-            interval_ns score runner_up_score rotation searched refinement;
-        gyre_motion_header_v11 MotionHeader: item motion;
-        gyre_pose_header_v11 PoseHeader: item motion x_m y_m yaw_rad covariance
-            accumulated_covariance trajectory_version;
-    }
-}
-
 #[test]
 fn its_messages_are_laid_out_as_those_of_gyre() {
-    let mut python = Command::new("python3");
-    python.arg(format!("{PROJECT}/examples/python-masking/messages.py"));
-    let Ok(output) = python.output() else {
+    let kept = include_str!("../../examples/python-masking/messages.json");
+    let layout = serde_json::to_string_pretty(&Layout::new()).unwrap();
+    assert!(
+        kept.trim() == layout,
+        "write it anew: gyre schema --messages > examples/python-masking/messages.json"
+    );
+    let script = format!("{PROJECT}/examples/python-masking/messages.py");
+    let Ok(output) = Command::new("python3").arg(script).output() else {
         return println!("skipped: there is no python3");
     };
+    // It asserts sizes and offsets.
     assert!(output.status.success(), "{output:?}");
-    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
-    for (name, size, offsets) in layouts() {
-        let of_python = &printed[name];
-        assert_eq!(of_python["size"], size, "{name}");
-        let fields = serde_json::to_value(&offsets).unwrap();
-        assert_eq!(of_python["offsets"], fields, "{name}");
-    }
-    for (name, size) in [
-        ("gyre_byte_block_v1", size_of::<ByteBlock>()),
-        ("gyre_float_block_v1", size_of::<FloatBlock>()),
-    ] {
-        assert_eq!(printed[name]["size"], size, "{name}");
-    }
 }
 
 #[test]

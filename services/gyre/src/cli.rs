@@ -159,9 +159,12 @@ pub enum Command {
     Config(ConfigArguments),
     /// Print the JSON schema of configurations, for editors.
     Schema {
-        /// Print the reference of the configuration in Markdown instead.
+        /// Print a reference in Markdown instead.
         #[arg(long)]
         markdown: bool,
+        /// Print the layout of all messages, for programs in other languages.
+        #[arg(long)]
+        messages: bool,
     },
     /// Print the completions of a shell.
     Completions {

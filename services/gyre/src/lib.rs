@@ -38,6 +38,7 @@ use gyre_configuration::{
     Configuration, schema,
     terminal::{Failure, inputs::Inputs, print},
 };
+use gyre_contract::layout;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     set_up_process(&command)?;
@@ -83,8 +84,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => conformance::conformance(&arguments),
         Command::Config(arguments) => gyre_configuration::terminal::inputs::config(&arguments),
-        Command::Schema { markdown: true } => shown(&schema::reference()),
-        Command::Schema { markdown: false } => shown(&schema::json()),
+        Command::Schema { markdown, messages } => shown(&schema(markdown, messages)?),
         Command::Completions { shell } => shown(completions(shell).trim_end()),
         Command::Man { folder } => write_manual(&folder),
     }
@@ -113,6 +113,16 @@ fn of_demo(set: Vec<String>, options: RunOptions) -> RunArguments {
         options,
         ..RunArguments::default()
     }
+}
+
+/// Returns the schema of configurations or the layout of messages, in JSON or for a page.
+fn schema(markdown: bool, messages: bool) -> Result<String, Failure> {
+    Ok(match (messages, markdown) {
+        (true, true) => layout::tables(),
+        (true, false) => serde_json::to_string_pretty(&layout::Layout::new())?,
+        (false, true) => schema::reference(),
+        (false, false) => schema::json(),
+    })
 }
 
 fn shown(text: &str) -> Result<ExitCode, Failure> {

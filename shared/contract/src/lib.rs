@@ -8,6 +8,7 @@ mod basis;
 pub mod control;
 mod follower;
 mod item;
+pub mod layout;
 mod limits;
 mod masked;
 mod message;

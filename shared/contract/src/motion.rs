@@ -1,7 +1,5 @@
 //! `rotation`, `motion` and `refined`: the motion of the vehicle between two scans.
 
-use std::f64::consts::PI;
-
 use gyre_geometry::{MAX_INTERVAL_NS, OdometryMotion, Twist, covariance, pose};
 
 use crate::{
@@ -11,7 +9,6 @@ use crate::{
     wire::{Bounds, wire},
 };
 
-const TURN: Bounds = Bounds::Within(-PI, PI);
 /// The search stays within one width of the raster; a prediction over a gap may be longer.
 const WIDTHS: Bounds = Bounds::Widths(10.0);
 const SHARE: Bounds = Bounds::Within(0.0, 1.0);
@@ -19,13 +16,13 @@ const SHARE: Bounds = Bounds::Within(0.0, 1.0);
 wire! {
     pub struct RotationEstimate = "gyre_rotation_estimate_v1" {
         /// Yaw of this scan's frame in the previous scan's frame, rad, counter-clockwise.
-        pub angle_rad: f64 [TURN],
+        pub angle_rad: f64 [Bounds::HalfTurn],
         /// Variance from the shape of the peak, rad^2.
         pub variance_rad2: f64 [Bounds::NotNegative],
         /// Height of the correlation peak, at most 1.
         pub score: f64 [Bounds::Finite],
         /// Angle, rad, and height of the second highest peak.
-        pub runner_up_rad: f64 [TURN],
+        pub runner_up_rad: f64 [Bounds::HalfTurn],
         pub runner_up_score: f64 [Bounds::Finite],
     }
 

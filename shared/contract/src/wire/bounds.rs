@@ -166,7 +166,9 @@ impl Display for Expected<'_> {
             (Bounds::Any | Bounds::CountedBy(_), _) => Ok(()),
             (Bounds::Finite, _) => write!(f, "finite"),
             (Bounds::NotNegative, _) => write!(f, "finite, 0 or more"),
-            (Bounds::Within(first, last), _) => write!(f, "from {first} to {last}"),
+            (Bounds::Within(first, last), _) => {
+                write!(f, "from {} to {}", Short(*first), Short(*last))
+            }
             (Bounds::AtLeast(least), _) => write!(f, "{least} or more"),
             (Bounds::Codes(names), _) => write!(f, "0 to {}", names.len() - 1),
             (Bounds::Bits(all), _) => write!(f, "bits of 1 to {}", all.div_ceil(2)),
@@ -186,6 +188,18 @@ impl Display for Expected<'_> {
             (Bounds::OfRun(_), None) => write!(f, "that of the run"),
             (Bounds::AtMost(property), Some(limits)) => write!(f, "at most {}", property(limits)),
             (Bounds::AtMost(_), None) => write!(f, "at most that of the run"),
+        }
+    }
+}
+
+/// A number in its shorter form.
+struct Short(f64);
+
+impl Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.abs() >= 1e6 {
+            true => write!(f, "{:e}", self.0),
+            false => write!(f, "{}", self.0),
         }
     }
 }
