@@ -61,7 +61,6 @@ const V1: Files = ("memory.limit_in_bytes", "memory.usage_in_bytes");
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

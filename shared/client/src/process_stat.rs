@@ -46,7 +46,6 @@ fn field<T: FromStr>(fields: &[&str], place: usize) -> Option<T> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::process::Command;
 
     use super::*;

@@ -77,7 +77,6 @@ fn count(status: &str, name: &str) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::{process::Command, thread, time::Instant};
 
     use super::*;

@@ -107,7 +107,6 @@ impl Route {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::path::{BlockLoop, SplinePath};
 

@@ -66,7 +66,6 @@ pub(crate) fn build(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::body::NO_BODY;
     use crate::path::SplinePath;

@@ -136,7 +136,6 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), StorageError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {

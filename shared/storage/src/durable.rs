@@ -115,7 +115,6 @@ fn never_zero(content: &[u8]) -> [u8; 8] {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[derive(Debug, Error)]

@@ -176,7 +176,6 @@ impl Drop for GroupSync {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -149,7 +149,6 @@ fn list(command: &Command) -> String {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn all() -> Vec<(&'static str, Vec<&'static str>)> {

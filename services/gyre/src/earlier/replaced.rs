@@ -137,7 +137,6 @@ fn empty(folder: &Path, others: &Path) -> Result<(), StorageError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::ops::Range;
 
     use gyre_contract::{Item, PoseHeader};

@@ -1,7 +1,5 @@
 //! Tests of both ends of a topic over the network layer, on this machine.
 
-#![allow(clippy::unwrap_used)]
-
 mod buffers;
 
 use std::{

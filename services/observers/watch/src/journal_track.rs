@@ -50,7 +50,6 @@ impl JournalTrack {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::fs;
 
     use gyre_contract::Item;

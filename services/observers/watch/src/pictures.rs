@@ -128,7 +128,6 @@ impl PackedPoints {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::f32::consts::TAU;
 
     use gyre_geometry::SweepGeometry;

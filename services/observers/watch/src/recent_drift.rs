@@ -65,7 +65,6 @@ fn length_m(motion: &OdometryMotion) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn pose(flags: u32) -> PoseHeader {

@@ -322,7 +322,6 @@ fn send_json(channel: &Newest, message: &impl Serialize) {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_contract::{Item, ListedObject, MaskedHeader, StageId};
     use gyre_geometry::SparsePoint;
     use serde_json::Value;

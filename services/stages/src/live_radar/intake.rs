@@ -125,7 +125,6 @@ impl Intake {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_colossus::{
         ByteOrder, ClockFormat, Datagrams, Event, Message, Powers, asterix::write_azimuth,
     };

@@ -130,7 +130,6 @@ impl ScanAssembly {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_colossus::{ClockFormat, Powers};
 
     use super::*;

@@ -147,7 +147,6 @@ fn command(list: &List, out: &Path, drive: &Drive) -> Command {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::{ffi::OsStr, fs};
 
     use super::*;

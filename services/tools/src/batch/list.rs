@@ -200,7 +200,6 @@ fn drive([path, name, configuration, set]: [String; 4]) -> Result<Drive, String>
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn read(text: &str) -> Result<List, Failure> {

@@ -155,7 +155,6 @@ fn cell(row: &Row, column: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::fs;
 
     use super::*;

@@ -129,7 +129,6 @@ fn remove(folder: &Path) -> Result<(), StorageError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     const FILES: [&str; 3] = ["tiles/0_0.png", "keyframes.log", "map.toml"];

@@ -203,7 +203,6 @@ fn export(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::fs;
 
     use clap::ValueEnum;

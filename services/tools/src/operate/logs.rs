@@ -150,7 +150,6 @@ fn readable(line: &str, process: Option<&str>) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::{fs::OpenOptions, io::Write};
 
     use super::*;

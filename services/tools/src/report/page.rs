@@ -231,7 +231,6 @@ fn differences(runs: &[(&Subject, &Run)]) -> String {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::{fs, path::Path};
 
     use gyre_datasets::read_trajectory;

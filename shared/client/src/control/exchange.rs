@@ -67,8 +67,6 @@ fn write(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
-
     use super::*;
     use std::{cell::RefCell, io::Read, net::Shutdown};
 

@@ -1,7 +1,5 @@
 //! Observers change nothing for the others, and count the messages that they miss.
 
-#![allow(clippy::unwrap_used)]
-
 use std::{path::Path, rc::Rc, time::Duration};
 
 use gyre_contract::{

@@ -122,7 +122,6 @@ fn resolution(protobuf: &[u8]) -> Result<Option<f32>, Malformed> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn assert_malformed(protobuf: &[u8], at: usize) {

@@ -214,7 +214,6 @@ fn between(samples: &[Sample], after_ns: i64, until_ns: i64) -> &[Sample] {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_geometry::samples::UpAxis;
     use proptest::prelude::*;
 

@@ -383,7 +383,6 @@ fn number(file: &File, offset: u64) -> io::Result<u64> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::io::Write as _;
 
     use super::*;

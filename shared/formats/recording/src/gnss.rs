@@ -72,7 +72,6 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, LogError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::fs;
 
     use super::*;

@@ -95,7 +95,6 @@ pub(crate) fn read<H: bytemuck::AnyBitPattern>(header: &[u8]) -> Option<H> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn rows(first: usize, stride: usize, width: usize, count: usize) -> Rows {

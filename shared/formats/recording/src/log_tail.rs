@@ -94,7 +94,6 @@ fn parse(line: &str, now_ns: i64) -> Option<LogLine> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::{fs::OpenOptions, io::Write};
 
     use super::*;

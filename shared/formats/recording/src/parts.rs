@@ -89,7 +89,6 @@ pub fn next_part(path: &Path, after: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::{Head, RecordingWriter};
 

@@ -70,7 +70,6 @@ impl Domain {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn domain(

@@ -205,7 +205,6 @@ pub fn occupancy_grid(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;

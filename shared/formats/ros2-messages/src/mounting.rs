@@ -55,7 +55,6 @@ impl Mounting {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::f64::consts::{FRAC_PI_2, PI};
 
     use gyre_geometry::xy_yaw;

@@ -120,7 +120,6 @@ fn check_number(what: &str, value: f64, bounds: RangeInclusive<f64>) -> Result<(
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

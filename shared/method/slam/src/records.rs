@@ -182,7 +182,6 @@ impl<R: Record> RecordReader<R> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::Query;
 

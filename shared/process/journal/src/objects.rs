@@ -129,7 +129,6 @@ impl From<&FixedObject> for Object {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -152,7 +152,6 @@ pub fn complete_scans(out: &Path, poses: u64) -> Result<u64, LogError> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_contract::{Item, MotionEstimate};
 
     use super::*;

@@ -168,7 +168,6 @@ fn unlink_incomplete_tags(directory: &Path) {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use gyre_client::Run;
     use gyre_contract::Pose;
     use gyre_transport::wake::Signals;

@@ -22,7 +22,6 @@ pub(crate) fn ends_within(process: &mut Child, limit: Duration) -> bool {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

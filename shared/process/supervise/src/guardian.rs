@@ -161,7 +161,6 @@ fn started(process: RawPid) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::os::unix::process::ExitStatusExt;
 
     use super::*;

@@ -190,7 +190,6 @@ fn length(file: &File) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn log(folder: &tempfile::TempDir) -> (Log, PathBuf) {

@@ -142,7 +142,6 @@ fn is_temporary(error: io::ErrorKind) -> bool {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     /// Starts with these results one after the other; returns the last one and the number of

@@ -52,7 +52,6 @@ pub fn read<const N: usize>(path: &Path) -> Option<[u64; N]> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::rig::Run;
 

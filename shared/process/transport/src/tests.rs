@@ -1,7 +1,5 @@
 //! The properties of the transport that this crate relies on, tested with real shared memory.
 
-#![allow(clippy::unwrap_used)]
-
 mod generations;
 mod hand_over;
 mod logs;

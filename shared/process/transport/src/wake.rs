@@ -204,7 +204,6 @@ fn drain(mut socket: &UnixStream) -> bool {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::io::Write;
 
     use super::*;

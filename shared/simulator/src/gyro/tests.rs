@@ -1,4 +1,3 @@
-#![allow(clippy::unwrap_used)]
 use gyre_geometry::samples::Sample;
 use nalgebra::Vector3;
 

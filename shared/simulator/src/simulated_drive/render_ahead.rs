@@ -60,7 +60,6 @@ fn start(drive: SimulatedDrive, index: usize) -> JoinHandle<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::SimulationConfig;
 

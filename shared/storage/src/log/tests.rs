@@ -1,4 +1,3 @@
-#![allow(clippy::unwrap_used)]
 use std::{fs, thread};
 
 use super::*;

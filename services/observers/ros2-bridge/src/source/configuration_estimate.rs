@@ -94,7 +94,6 @@ impl ConfigurationEstimate {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -1,5 +1,3 @@
-#![allow(clippy::unwrap_used)]
-
 use std::{f64::consts::TAU, iter::successors, net::UdpSocket};
 
 use gyre_geometry::{

@@ -27,7 +27,6 @@ pub fn used_loops(path: &Path) -> Result<Vec<[u64; 2]>, Failure> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::fs;
 
     use super::*;

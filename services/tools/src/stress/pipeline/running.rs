@@ -176,7 +176,6 @@ fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::process::Command;
 
     use super::*;

@@ -1,5 +1,3 @@
-#![allow(clippy::unwrap_used)]
-
 use gyre_contract::{gyro, outcome};
 
 use super::*;

@@ -1,4 +1,3 @@
-#![allow(clippy::unwrap_used)]
 use super::*;
 use crate::{
     asterix::{MAX_DATAGRAM_BYTES, write_azimuth, write_description},

@@ -38,7 +38,6 @@ fn reason(text: &str, error: &toml::de::Error) -> String {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use std::fs;
 
     use super::*;

@@ -213,7 +213,6 @@ fn sweep_angle(first_rad: f32, azimuth_rad: f32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
     use proptest::prelude::*;
 

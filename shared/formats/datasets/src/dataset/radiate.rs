@@ -220,7 +220,6 @@ fn parse_line(line: &str) -> Option<Receipt> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

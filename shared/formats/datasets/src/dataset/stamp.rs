@@ -69,7 +69,6 @@ pub fn middle_ns(first_ns: i64, last_ns: i64) -> i64 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -35,7 +35,6 @@ fn radar_pose(m: &[f64; 12]) -> Pose {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

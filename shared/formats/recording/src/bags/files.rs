@@ -181,7 +181,6 @@ fn database(path: &Path) -> RecordingError {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn folder(metadata: &str, files: &[&str]) -> tempfile::TempDir {

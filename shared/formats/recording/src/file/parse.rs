@@ -135,7 +135,6 @@ fn long(rest: &mut &[u8]) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn text(text: &str) -> Vec<u8> {
