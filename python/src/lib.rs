@@ -2,8 +2,9 @@
 //! rasters and points as numpy arrays.
 //!
 //! Reading order: `config`, `dataset`, `scan` (whose memory is numpy's), `odometry` and
-//! `registered`, `masker`, `slam`, `trajectory`, `evaluation`; `run`, for running runs; `errors` and `values` convert errors
-//! and values between Rust and Python. `package/` holds the part that is written in Python.
+//! `registered`, `masker`, `slam`, `trajectory`, `evaluation`; `run`, for running runs; `errors`
+//! and `values` convert errors and values between Rust and Python. `package/` holds the part that
+//! is written in Python.
 //!
 //! The GIL is released while scans are decoded and computed. Each object of Rust that changes is
 //! behind a lock, which is taken without the GIL: two threads that share one wait for each other,

@@ -110,7 +110,7 @@ impl Run {
         self.observe("fix")
     }
 
-    /// What the run and its processes do: a dictionary.
+    /// Returns the state of the run and of its processes as a dictionary.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         values::dictionary(py, &self.control()?.status().map_err(failed)?)
     }
@@ -146,7 +146,7 @@ pub struct Messages {
 
 #[pymethods]
 impl Messages {
-    /// How many messages were missed so far.
+    /// The number of messages that were missed so far.
     #[getter]
     fn missed(&self) -> u64 {
         self.observer.missed()
@@ -193,7 +193,7 @@ impl Messages {
 pub struct Message {
     held: Option<Rc<gyre_client::Message<AnyMessage>>>,
     topic: &'static Topic,
-    /// How many messages were missed directly before this one.
+    /// The number of messages that were missed directly before this one.
     #[pyo3(get)]
     missed: u64,
 }

@@ -5,6 +5,7 @@
 mod exchange;
 
 use std::{
+    env,
     fmt::Display,
     fs, io,
     os::unix::fs::MetadataExt,
@@ -190,6 +191,17 @@ impl Control {
             "the run that writes to {out} does not answer: {reason}"
         ))
     }
+}
+
+/// Returns the place of a program as a shell finds it: itself if it is a path, else in the folders
+/// of PATH.
+#[must_use]
+pub fn place_of_program(program: &str) -> PathBuf {
+    let folders = env::var_os("PATH").unwrap_or_default();
+    let place = env::split_paths(&folders)
+        .map(|folder| folder.join(program))
+        .find(|path| !program.contains('/') && path.is_file());
+    place.unwrap_or_else(|| PathBuf::from(program))
 }
 
 fn id_of(root: &Path) -> Option<(u64, u64)> {

@@ -106,25 +106,26 @@ wire! {
         pub scan: u64,
         /// The scan that this one is matched against (itself where the chain starts).
         pub previous_scan: u64,
-        /// Sequence number at the source: a gap between consecutive items counts the scans dropped in
-        /// live mode.
+        /// Sequence number at the source: a gap between consecutive items counts the scans dropped
+        /// in live mode.
         pub published: u64,
-        /// The first number that its generation gives. Items of earlier generations with this number or
-        /// a later one are void: nothing was computed from them that lasts.
+        /// The first number that its generation gives. Items of earlier generations with this
+        /// number or a later one are void: nothing was computed from them that lasts.
         pub numbered_from: u64,
         /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
         pub stamp_ns: i64,
-        /// Time when the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`, ns.
-        /// Latency is measured from here.
+        /// Time when the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`,
+        /// ns. Latency is measured from here.
         pub due_ns: i64,
-        /// Generation of the numbers: it grows when masking (live mode) or the source of a sensor is
-        /// started, which may give a number again. 0 where the numbers follow from the recording.
+        /// Generation of the numbers: it grows when masking (live mode) or the source of a sensor
+        /// is started, which may give a number again. 0 where the numbers follow from the
+        /// recording.
         pub generation: u32,
         /// Bits of [`flag`].
         pub flags: u32 [Bounds::Bits(flag::ALL as u64)],
-        /// Gaps where azimuths were lost, as masking has found them: the first and the last row before
-        /// which a gap may be, and its number of azimuths, 0 behind the last gap. The pose keeps them
-        /// for a masking that is restarted.
+        /// Gaps where azimuths were lost, as masking has found them: the first and the last row
+        /// before which a gap may be, and its number of azimuths, 0 behind the last gap. The pose
+        /// keeps them for a masking that is restarted.
         pub lost: [[u16; 3]; MAX_GAPS],
         pub hops: Hops,
     }

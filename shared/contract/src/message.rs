@@ -70,14 +70,14 @@ impl Sender {
     }
 }
 
-/// What observers do with a topic unless they are asked for others.
+/// The use of a topic by observers that were not asked for particular topics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
     /// A recorder records it.
     Recorded,
     /// A link sends it.
     Linked,
-    /// Its messages have payloads, and a link may lose some.
+    /// Messages have payloads, and a link may lose some.
     Large,
     /// Each message replaces those before, and its numbers count what it consists of. So a gap is
     /// no loss.

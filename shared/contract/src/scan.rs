@@ -18,9 +18,9 @@ use crate::{
 const ROWS: Bounds = Bounds::CountedBy("azimuths");
 
 wire! {
-    /// The geometry of a scan, and the measured angle and time of each azimuth. The power of azimuth
-    /// `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload. The samples of
-    /// other sensors follow in the payload's next block: [`ScanHeader::samples`].
+    /// The geometry of a scan, and the measured angle and time of each azimuth. The power of
+    /// azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload. The
+    /// samples of other sensors follow in the payload's next block: [`ScanHeader::samples`].
     pub struct ScanHeader = "gyre_scan_header_v7" {
         pub item: Item,
         pub azimuths: u32 [Bounds::Within(1.0, MAX_AZIMUTHS as f64)],

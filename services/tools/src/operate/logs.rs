@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(log.lines(), ["masking: 3"], "it was emptied meanwhile");
     }
 
-    const LINE: &str = r#"{"timestamp":"2026-11-23T21:04:05.678901Z","level":"WARN","fields":{"message":"skipped: it is damaged","scan":7},"target":"gyre_stage::source","span":{"stage":"radar-replay","name":"process"},"spans":[]}"#;
+    const LINE: &str = r#"{"timestamp":"2026-11-23T21:04:05.678901Z","level":"WARN","fields":{"message":"skipped: it is damaged","scan":7},"target":"source","span":{"stage":"radar-replay","name":"process"},"spans":[]}"#;
 
     #[test]
     fn an_event_is_a_line_with_its_time_its_process_and_its_fields() {

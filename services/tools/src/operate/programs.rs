@@ -3,12 +3,12 @@
 use std::{env, path::PathBuf, process::ExitCode};
 
 use clap::Args;
+use gyre_client::control::place_of_program;
 use gyre_configuration::terminal::{Failure, print, words};
 use gyre_contract::{
     control::{PendingSwap, Swap},
     run::StageConfig,
 };
-use gyre_supervise::Program;
 
 use crate::operate::choice::{RunChoice, chosen_to_change};
 
@@ -79,7 +79,7 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let mut command = arguments.command.as_deref().map(words).transpose()?;
     // Found as in this terminal: the supervisor may have been started with another PATH.
     if let Some(program) = command.as_mut().and_then(|command| command.first_mut()) {
-        *program = Program::place_of(program).display().to_string();
+        *program = place_of_program(program).display().to_string();
     }
     if let Some(file) = &arguments.python {
         // By its own name: this process ends before the stage does.

@@ -1,7 +1,8 @@
 //! The loops of a run's processes: credit, history and life cycle, on the topics of
 //! [`gyre_transport`].
 //!
-//! Reading order: [`launch`]; the loops [`source`], [`stage`], [`sink`] and [`follower`]; [`relay`].
+//! Reading order: [`launch`]; the loops [`source`], [`stage`], [`sink`] and [`follower`];
+//! [`relay`].
 //!
 //! The protocol: items carry consecutive sequence numbers. The source may have W of them in flight;
 //! each pose is the credit for one more. A stage is a function of its inputs, and a publisher keeps

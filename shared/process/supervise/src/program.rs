@@ -1,10 +1,12 @@
 //! The files that a command executes, which must not change during the run.
 
 use std::{
-    env, fs, io, iter,
+    fs, io, iter,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
 };
+
+use gyre_client::control::place_of_program;
 
 /// A file that a command executes, as it was when the run was begun or resumed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,17 +40,6 @@ impl Program {
         files.filter_map(|path| Self::at(&path).ok()).collect()
     }
 
-    /// Returns the place of a program as a shell finds it: itself if it is a path, else in the
-    /// folders of PATH.
-    #[must_use]
-    pub fn place_of(program: &str) -> PathBuf {
-        let folders = env::var_os("PATH").unwrap_or_default();
-        let place = env::split_paths(&folders)
-            .map(|folder| folder.join(program))
-            .find(|path| !program.contains('/') && path.is_file());
-        place.unwrap_or_else(|| PathBuf::from(program))
-    }
-
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -64,7 +55,7 @@ fn files_of(command: &[String], directory: &Path) -> Vec<PathBuf> {
         return Vec::new();
     };
     let scripts = arguments.iter().map(PathBuf::from);
-    iter::once(Program::place_of(program))
+    iter::once(place_of_program(program))
         .chain(scripts)
         .map(|path| directory.join(path))
         .filter(|path| path.is_file())

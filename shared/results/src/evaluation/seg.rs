@@ -29,8 +29,8 @@ pub struct SegLength {
     pub segments: usize,
 }
 
-/// Returns the mean error of the segments of [`kitti`](crate::evaluation::kitti::kitti), each aligned
-/// separately; `None` if the path is not longer than 100 m.
+/// Returns the mean error of the segments of [`kitti`](crate::evaluation::kitti::kitti), each
+/// aligned separately; `None` if the path is not longer than 100 m.
 pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
     let errors = PerLength::of(matched, step, |segment| {
         let range = segment.first..=segment.last;

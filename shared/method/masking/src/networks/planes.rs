@@ -46,8 +46,8 @@ pub(crate) enum Engine {
 }
 
 impl PlanesNetwork {
-    /// Loads the network of a name in `gyre_storage::shipped`, into the ONNX Runtime at a path or, without
-    /// one, into rten, which takes several times as long.
+    /// Loads the network of a name in `gyre_storage::shipped`, into the ONNX Runtime at a path or,
+    /// without one, into rten, which takes several times as long.
     pub fn load(
         name: &'static str,
         runtime: Option<&Path>,

@@ -5,9 +5,9 @@ use crate::{
     odometry::{DecoupledSearch, OdometryConfig, Search, SearchKind, SetupError},
 };
 
-/// The parts that an [`Odometry`](crate::odometry::Odometry) is composed of. Each part comes from the
-/// configuration. [`Masker::with_function`] has a mask of your own, and `examples/own_search.rs`
-/// replaces the search.
+/// The parts that an [`Odometry`](crate::odometry::Odometry) is composed of. Each part comes from
+/// the configuration. [`Masker::with_function`] has a mask of your own, and
+/// `examples/own_search.rs` replaces the search.
 pub struct Parts {
     pub masker: Masker,
     pub search: Box<dyn Search>,

@@ -1,7 +1,7 @@
 use thiserror::Error;
 
-/// Errors of [`TrajectoryFilter`](crate::estimation::TrajectoryFilter) and [`PoseGraph`](crate::estimation::PoseGraph). An
-/// estimator that returns one is unchanged.
+/// Errors of [`TrajectoryFilter`](crate::estimation::TrajectoryFilter) and
+/// [`PoseGraph`](crate::estimation::PoseGraph). An estimator that returns one is unchanged.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EstimationError {

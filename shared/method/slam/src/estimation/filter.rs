@@ -13,9 +13,9 @@ use crate::estimation::{
 /// third by less than a millimetre.
 const LINEARISATIONS: usize = 3;
 
-/// The extended Kalman filter over the poses of all keyframes, without a map (Checchin et al.,
-/// Sec. 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the
-/// number of keyframes, a loop to its square: use [`PoseGraph`](crate::estimation::PoseGraph) for long
+/// The extended Kalman filter over the poses of all keyframes, without a map (Checchin et al., Sec.
+/// 4.1); the first pose is known exactly. A new keyframe costs time in proportion to the number of
+/// keyframes, a loop to its square: use [`PoseGraph`](crate::estimation::PoseGraph) for long
 /// trajectories. The paper's filter keeps the covariance of x, y and yaw of each pose, this filter
 /// the covariance of a small motion of the world that takes the estimated pose to the true one: to
 /// first order the same. An error of yaw moves the poses after it around an arc instead of along

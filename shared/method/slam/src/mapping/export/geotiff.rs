@@ -27,8 +27,8 @@ const BANDS: &str = "<GDALMetadata>\
     </GDALMetadata>";
 
 /// Writes the map as one GeoTIFF of two bands: evidence, and how often a cell was looked at as
-/// opacity (see [`Cell`](crate::mapping::Cell)). With an origin it is in the UTM zone of that, turned by the
-/// heading; without, in metres of the map frame.
+/// opacity (see [`Cell`](crate::mapping::Cell)). With an origin it is in the UTM zone of that,
+/// turned by the heading; without, in metres of the map frame.
 pub fn write_geotiff(
     path: &Path,
     source: &mut impl TileSource,
