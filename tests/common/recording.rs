@@ -16,6 +16,9 @@ use tempfile::TempDir;
 use super::Run;
 
 pub const SCANS: usize = 24;
+/// A rate at which the small recording's six seconds take one: slow enough to disturb the middle.
+pub const MODERATE: &str = "6";
+pub const MIDDLE: usize = SCANS / 3;
 
 /// The radar of the small recordings in a section `[simulation]`. It has a sixth of the default
 /// one's bins: what happens between processes does not depend on them.

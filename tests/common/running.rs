@@ -129,6 +129,13 @@ impl Running {
         ended
     }
 
+    /// Waits until the run ends well, and returns its `odometry.csv`.
+    pub fn complete(self) -> String {
+        let run = self.run.clone();
+        self.finish().succeeded();
+        run.odometry()
+    }
+
     /// Waits until the run ends, perhaps by a signal, which leaves its files to the next run.
     pub fn end(mut self) -> Ended {
         let status = self.process.wait();

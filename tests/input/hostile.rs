@@ -130,8 +130,7 @@ fn a_pipe_in_place_of_a_file_is_refused_at_once() {
     }
     for data in [options.path(), &recorded] {
         let out = folder.path().join("out");
-        let ended = at_once(&["run", path(data), "--out", path(&out)]);
-        ended.refused_with(&[is_pipe]);
+        at_once(&["run", path(data), "--out", path(&out)]).refused_with(&[is_pipe]);
     }
 }
 
@@ -144,8 +143,7 @@ fn replace_by_pipe(file: &Path) {
 #[test]
 fn a_journal_and_logs_of_impossible_lengths_are_refused_and_a_mended_run_goes_on() {
     let run = Run::of_recording().rate("6").set("slam.kind=graph");
-    let mut running = run.start();
-    running.await_poses(recording::SCANS / 2);
+    let running = run.started(recording::SCANS / 2);
     running.kill_supervisor();
     let out = run.out();
     for log in [

@@ -6,7 +6,7 @@ use std::{fs, path::Path};
 use gyre_transport::run::SHARED_MEMORY;
 
 use crate::{
-    common::{Ended, Run, STAGES, odometry, recording},
+    common::{Ended, Run, STAGES, odometry, recording, with_tmpfs},
     restart::faults::configurations,
 };
 
@@ -162,7 +162,7 @@ fn an_unknown_stage_and_a_stage_without_a_run_are_reported() {
 #[test]
 fn too_little_shared_memory_is_reported_with_the_need_and_just_enough_suffices() {
     let run = Run::of_recording();
-    let with = |options: &str| run.with_tmpfs(Path::new(SHARED_MEMORY), options);
+    let with = |options: &str| with_tmpfs(&run.command(), Path::new(SHARED_MEMORY), options);
     let Some(small) = with("size=1m") else {
         return;
     };

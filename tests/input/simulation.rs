@@ -149,8 +149,8 @@ fn start(out: &Path) -> Child {
 fn a_folder_of_another_recording_is_refused() {
     let recording = written(&[]);
     let faster = ["--set", "simulation.drive.speed_mps=5"];
-    let refused = Ended::of(simulate(recording.path(), &faster));
-    refused.refused_with(&["dataset of another configuration", "another folder"]);
+    Ended::of(simulate(recording.path(), &faster))
+        .refused_with(&["dataset of another configuration", "another folder"]);
     let unknown = Ended::of(simulate(recording.path(), &["--format", "fomo"])).stderr;
     assert!(
         unknown.contains("`oxford`, `boreas`, `radiate`"),

@@ -242,8 +242,8 @@ fn unreadable_scans_are_left_out_and_reported() {
     let said = &ended.succeeded().stderr;
     assert!(said.starts_with("left out: "), "{said}");
     assert_eq!(names(folder.path()), ["masks.png", "scan-000005.png"]);
-    let ended = masks_of(damaged.path(), folder.path(), &["--scans", "4"]);
-    ended.failed_with(&["none of the chosen scans can be read"]);
+    masks_of(damaged.path(), folder.path(), &["--scans", "4"])
+        .failed_with(&["none of the chosen scans can be read"]);
 }
 
 #[test]

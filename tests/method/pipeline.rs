@@ -2,12 +2,12 @@
 
 use std::{collections::BTreeSet, fs, process::Command};
 
-use crate::common::{Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
+use crate::common::{
+    Run, STAGES, assert_nothing_left, odometry,
+    recording::{self, MIDDLE, MODERATE},
+    undisturbed,
+};
 use rustix::process::Signal;
-
-/// Slow enough to be disturbed in the middle: the recording's six seconds in one.
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
 
 #[test]
 fn six_processes_of_their_own_are_there_while_it_runs() {

@@ -3,9 +3,16 @@
 
 use std::{collections::BTreeSet, fs};
 
-use crate::common::{Run, STAGES, odometry::columns, recording, undisturbed};
+use crate::{
+    common::{
+        Run, STAGES,
+        odometry::columns,
+        recording::{self, MIDDLE},
+        undisturbed,
+    },
+    restart::results::interrupted,
+};
 use gyre_journal::{self as journal, Journal};
-use rustix::process::Signal;
 use serde_json::Value;
 
 const REFINEMENT: &str = "refinement";
@@ -18,13 +25,6 @@ const SEARCHED: [&str; 5] = [
     "runner_up_score",
 ];
 const MOTION: [&str; 3] = ["x_m", "y_m", "yaw_rad"];
-/// The recording's six seconds in one.
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
-
-fn without() -> Run {
-    Run::of_recording().set("refinement.kind=none")
-}
 
 pub fn names(object: &Value) -> BTreeSet<String> {
     object.as_object().unwrap().keys().cloned().collect()
@@ -54,7 +54,7 @@ fn each_motion_is_counted_by_how_its_refinement_ended() {
 /// motions are refined or not.
 #[test]
 fn a_run_that_does_not_refine_has_the_searched_motions_which_are_farther_from_the_truth() {
-    let run = without();
+    let run = Run::of_recording().set("refinement.kind=none");
     let odometry = run.complete();
     let summary = run.summary();
     assert!(summary.get("motions").is_none());
@@ -78,14 +78,6 @@ fn a_run_that_does_not_refine_has_the_searched_motions_which_are_farther_from_th
 }
 
 // Its map.
-
-fn interrupted() -> Run {
-    let run = Run::of_recording();
-    let mut running = run.clone().rate(MODERATE).start();
-    running.await_poses(MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
-    run
-}
 
 /// Returns what damage can leave of a map.
 fn damages(whole: &[u8]) -> [Vec<u8>; 4] {

@@ -77,8 +77,7 @@ fn driving(rate: &str) -> Run {
 }
 
 fn started(run: &Run) -> (Running, Server) {
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     let options = ["--foxglove", "127.0.0.1:0"];
     (running, Server::start(run, "127.0.0.1", &options))
 }
@@ -228,8 +227,7 @@ fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
     let early = own_bytes(server.pid());
     running.await_poses(recording::SCANS_AROUND);
     let late = own_bytes(server.pid());
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(running.complete(), undisturbed);
     // A hundred scans and rasters are more than twice that.
     assert!(late < early + (16 << 20), "from {early} to {late} bytes");
     server.interrupt();

@@ -15,9 +15,9 @@ use serde_json::Value;
 
 use crate::{
     common::{
-        Ended, Run, Running, gyre, odometry, processes, python, real_data,
+        Ended, Run, Running, finished, gyre, odometry, processes, python, real_data,
         recording::{SCANS, around_a_block},
-        send, undisturbed,
+        send, undisturbed, with_tmpfs,
     },
     operate::commands::{ask, await_status, process},
     reach::{only_if, python_has},
@@ -53,10 +53,8 @@ pub fn replay(recording: &Path, arguments: &[&str]) -> String {
 
 pub fn replayed(recording: &Path, arguments: &[&str]) -> (Run, Ended) {
     let run = Run::configured("");
-    let mut command = gyre();
-    command.arg("run").arg(recording);
-    command.args(arguments).arg("--out").arg(run.out());
-    (run, Ended::of(command))
+    let ended = finished!["run", recording, "--out", run.out(); arguments];
+    (run, ended)
 }
 
 pub fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
@@ -93,9 +91,8 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
         let odometry = replay(&file(&run), &["--from", topic]);
         assert_eq!(odometry, undisturbed(), "from {topic}");
     }
-    let mut inspect = gyre();
-    inspect.args(["inspect", "--json"]).arg(file(&run));
-    let report: Value = serde_json::from_str(&Ended::of(inspect).succeeded().stdout).unwrap();
+    let inspected = finished!["inspect", "--json", file(&run)];
+    let report: Value = serde_json::from_str(&inspected.succeeded().stdout).unwrap();
     assert_eq!(report["format"], "mcap");
     assert_eq!(report["scans"], SCANS);
     assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
@@ -104,8 +101,7 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
 #[test]
 fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() {
     let run = recorded(&played()).rate("1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
+    let mut running = run.started(SCANS / 4);
     let killed = await_recorder(&mut running, None);
     send(killed, Signal::KILL);
     await_recorder(&mut running, Some(killed));
@@ -155,8 +151,7 @@ fn await_file(path: &Path) {
 #[test]
 fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     let run = recorded(&played()).set(ALL).rate("1").set("run.window=1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
+    let mut running = run.started(SCANS / 4);
     let recorder = await_recorder(&mut running, None);
     send(recorder, Signal::STOP);
     running.await_poses(SCANS - 4);
@@ -195,8 +190,7 @@ fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
 #[test]
 fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_counted() {
     let run = recorded(&played()).rate("1").set("run.window=1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
+    let mut running = run.started(SCANS / 4);
     let killed = await_recorder(&mut running, None);
     // It writes nothing from here on, so that the gap is longer than the history of the topics,
     // however fast the machine is.
@@ -213,8 +207,7 @@ fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_count
 #[test]
 fn a_recorder_that_dies_right_before_the_end_is_reported() {
     let run = recorded(&played()).rate("1").set("record.topics=['scan']");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
+    let mut running = run.started(SCANS / 4);
     let recorder = await_recorder(&mut running, None);
     send(recorder, Signal::STOP);
     running.await_poses(SCANS);
@@ -259,8 +252,7 @@ fn the_recorder_is_listed_with_the_health_that_it_records_and_started_again_on_r
     recorder("a restart after its death", &|it| {
         it["restarts"] == 2 && it["last_death"] == "signal 9"
     });
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let parts = parts(&file(&run));
     assert_eq!(parts.len(), 3);
     let scans = seqs(&open_recording(&file(&run)).unwrap(), "scan");
@@ -293,8 +285,7 @@ fn a_recording_holds_what_sensors_measured_and_replays_with_and_without_it() {
 #[test]
 fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
     let run = played().rate("1").set("run.window=1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 3);
+    let running = run.started(SCANS / 3);
     let mut record = gyre();
     record.arg("record").arg(run.out());
     record.args(["--topics", "scan,masked", "--to"]);
@@ -326,22 +317,13 @@ fn a_recording_without_the_topic_that_is_played_is_refused_with_how_to_record_it
 }
 
 #[test]
-fn a_recording_is_not_overwritten() {
-    let run = recorded(&played());
-    fs::write(file(&run), "mine").unwrap();
-    run.finish()
-        .refused_with(&["drive.mcap exists", "never overwritten"]);
-    assert_eq!(fs::read_to_string(file(&run)).unwrap(), "mine");
-}
-
-#[test]
 fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
     let run = played();
     let place = run.folder().join("small");
     fs::create_dir(&place).unwrap();
     let file = place.join("drive.mcap");
     let recorded = run.clone().argument("--record", file.to_str().unwrap());
-    let Some(command) = recorded.with_tmpfs(&place, "size=512k") else {
+    let Some(command) = with_tmpfs(&recorded.command(), &place, "size=512k") else {
         return;
     };
     let ended = recorded.start_as(command).finish();

@@ -66,8 +66,7 @@ fn assert_is_of(run: &Run) -> BTreeMap<&'static str, usize> {
 #[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
     let run = played();
-    let mut running = run.start();
-    running.await_poses(12);
+    let mut running = run.started(12);
     let recorder = await_recorder(&mut running, None);
     send(recorder, Signal::KILL);
     running.kill("masking");
@@ -92,8 +91,7 @@ fn a_recording_has_all_results_of_a_run_that_was_stopped() {
         // Scans are in flight all the time, so that poses follow the request to stop.
         let run = run.set(WINDOW).set("stages.refinement.delay_ms=15");
         let run = recorded(&run.set(TOPICS).rate("max"));
-        let mut running = run.start();
-        running.await_poses(20);
+        let running = run.started(20);
         running.signal(Signal::INT);
         running.end();
         let (poses, recording) = (scans_of_poses(&run), open_recording(&file(&run)).unwrap());
@@ -109,8 +107,7 @@ fn a_recording_has_all_results_of_a_run_that_was_stopped() {
 fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorder_was_there() {
     // Without poses only the recorder can know which numbers the second masking reused.
     let run = played().set("record.topics=['masked','motion']");
-    let mut running = run.start();
-    running.await_poses(8);
+    let mut running = run.started(8);
     // It does nothing from here on, as if it came back only after the second kill.
     let recorder = await_recorder(&mut running, None);
     send(recorder, Signal::STOP);

@@ -6,7 +6,7 @@ use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
 
 use super::record::{await_recorder, file, played, recorded, replay, seqs};
-use crate::common::{Ended, gyre, recording::SCANS, send, undisturbed};
+use crate::common::{finished, recording::SCANS, send, undisturbed};
 
 /// Moves all parts but the newest one; returns how many.
 fn move_away(recording: &Path, to: &Path) -> usize {
@@ -25,8 +25,7 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     let run = recorded(&played()).rate("1").set("record.split_s=0.7");
     let other_disk = run.folder().join("disk");
     fs::create_dir(&other_disk).unwrap();
-    let mut running = run.start();
-    running.await_poses(SCANS / 3);
+    let mut running = run.started(SCANS / 3);
     let moved = move_away(&file(&run), &other_disk);
     assert!(moved > 0);
     // A new recorder continues without the first part.
@@ -39,9 +38,7 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     // The rest is a recording without its first part, and reports it.
     let rest = open_recording(&file(&run)).unwrap();
     assert!(rest.absent_parts().contains(&1));
-    let mut inspect = gyre();
-    inspect.arg("inspect").arg(file(&run));
-    let inspected = Ended::of(inspect);
+    let inspected = finished!["inspect", file(&run)];
     let said = &inspected.stdout;
     assert!(said.contains("Part 1 of the recording"), "{said}");
     let left = parts(&file(&run));

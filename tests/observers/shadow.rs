@@ -17,7 +17,7 @@ use crate::{
     common::{Ended, Pid, Run, Running, gyre, processes, send, undisturbed},
     input::breaks,
     method::learned_masks::{TWO_SCANS, card},
-    operate::commands::ask,
+    operate::commands::{ask, up},
     reach::conformance,
 };
 
@@ -47,8 +47,7 @@ fn undisturbed_long() -> &'static str {
 
 /// Starts a run, and holds it after some poses: it does not end before shadows are there.
 fn held(run: &Run) -> Running {
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     hold(&running);
     running
 }
@@ -172,8 +171,7 @@ fn shadows_that_fail_in_any_way_are_named_and_the_run_is_untouched() {
     ];
     shadows.iter().for_each(|shadow| shadow.await_rows(1));
     release(&running);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed_long());
+    assert_eq!(running.complete(), undisturbed_long());
     let [differs, slow, floods, dies, silent] = shadows;
 
     let (code, report) = differs.end();
@@ -212,8 +210,7 @@ fn a_program_that_does_not_come_is_given_up_while_the_run_goes_on() {
         assert!(report["ends"].to_string().contains(words), "{report:#}");
     }
     release(&running);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
@@ -266,8 +263,7 @@ fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
 fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
     let run = long().rate(HALF_RATE).set("run.mode=live");
     let run = run.set("stages.masking.delay_ms=50");
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     let shadow = Shadow::start(&run, "masking", "masking", &[]);
     // With many scans dropped, motions may be too long for the radar: that is a problem of its own.
     running.finish();
@@ -280,9 +276,7 @@ fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
 fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
     let run = Run::of_recording().rate("0.3").set("raster.n=63");
     let run = run.set("search.kind=exhaustive");
-    let mut up = gyre();
-    up.arg("up").args(run.command().get_args().skip(1));
-    Ended::of(up).succeeded();
+    Ended::of(up(&run)).succeeded();
     let options = ["--scans", "3", "--nice", "15"];
     let shadow = Shadow::start(&run, "joint", "joint-search", &options);
     let (code, report) = shadow.end();
@@ -315,8 +309,7 @@ fn an_interrupted_shadow_reports_and_the_program_of_a_killed_one_ends() {
         thread::sleep(Duration::from_millis(10));
     }
     release(&running);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 fn refused(run: &Run, arguments: &[&str], words: &[&str]) {

@@ -16,7 +16,9 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 pub(crate) use drives::Drives;
 
-use crate::common::{Ended, assert_nothing_left, gyre, leftovers, processes, recording, send};
+use crate::common::{
+    Ended, assert_nothing_left, gyre, leftovers, processes, recording, send, with_tmpfs,
+};
 
 /// A batch takes seconds, far more only on a loaded machine.
 const LIMIT: Duration = Duration::from_secs(180);
@@ -373,24 +375,10 @@ fn a_batch_or_a_task_that_cannot_be_is_refused_in_a_sentence() {
     batch(&[]).refused_with(&["list of drives", "list.csv"]);
 }
 
-/// The end of a batch with a disk of this size at a place, then of that without; `None` if that is
-/// not permitted here.
+/// The end of a batch with a disk of this size at a place; `None` if that is not permitted here.
 fn on_small_disk(batch: &Batch<'_>, place: &Path, size: &str) -> Option<Ended> {
     fs::create_dir_all(place).unwrap();
-    let mut command = Command::new("unshare");
-    let mount = "mount -t tmpfs -o size=\"$1\" tmpfs \"$0\" && shift && exec \"$@\"";
-    let own = batch.command();
-    command
-        .args(["--mount", "sh", "-c", mount])
-        .arg(place)
-        .arg(size);
-    command.arg(own.get_program()).args(own.get_args());
-    let permitted = Command::new("unshare").args(["--mount", "true"]).status();
-    if !permitted.is_ok_and(|status| status.success()) {
-        println!("skipped: a mount namespace of its own is not permitted here");
-        return None;
-    }
-    Some(Ended::of(command))
+    with_tmpfs(&batch.command(), place, &format!("size={size}")).map(Ended::of)
 }
 
 #[test]

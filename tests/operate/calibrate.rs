@@ -111,15 +111,14 @@ fn drives_that_are_read_with_different_constants_are_refused() {
     fs::remove_file(&settings).unwrap();
     fs::write(&settings, changed).unwrap();
     let with = ["--with", other.path().to_str().unwrap()];
-    let ended = calibrate(recording, out.path(), &["source.scans=2"], &with);
-    ended.failed_with(&["range_offset_m", "with -0.4, which is not one radar"]);
+    calibrate(recording, out.path(), &["source.scans=2"], &with)
+        .failed_with(&["range_offset_m", "with -0.4, which is not one radar"]);
 }
 
 #[test]
 fn a_drive_that_is_too_short_is_refused() {
     let out = tempfile::tempdir().unwrap();
-    let ended = calibrate(recording::small(), out.path(), &["source.scans=3"], &[]);
-    ended.failed_with(&["scans"]);
+    calibrate(recording::small(), out.path(), &["source.scans=3"], &[]).failed_with(&["scans"]);
     assert!(!out.path().join("calibration.toml").exists());
 }
 

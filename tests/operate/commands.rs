@@ -15,9 +15,10 @@ use serde_json::Value;
 use crate::{
     PROGRAM,
     common::{
-        Ended, Pid, Run, Running, STAGES, assert_nothing_left, folder, gyre, recording, send,
-        undisturbed,
+        Ended, Pid, Run, Running, STAGES, assert_nothing_left, can, can_mount, finished, folder,
+        gyre, recording, send, undisturbed,
     },
+    reach::only_if,
 };
 
 /// The recording's six seconds in two.
@@ -28,9 +29,7 @@ const THIRD: usize = recording::SCANS / 3;
 
 /// A command about a run.
 pub(crate) fn ask(run: &Run, arguments: &[&str]) -> Ended {
-    let mut command = gyre();
-    command.args(arguments).arg(run.out());
-    Ended::of(command)
+    finished![; arguments; [run.out()]]
 }
 
 /// The state of a run by `gyre ps --json`; `None` if it does not run. It is named, since the run of
@@ -42,7 +41,7 @@ pub(crate) fn status(run: &Run) -> Option<Value> {
 }
 
 /// The command that starts a run in the background.
-fn up(run: &Run) -> Command {
+pub(crate) fn up(run: &Run) -> Command {
     let mut up = gyre();
     up.arg("up").args(run.command().get_args().skip(1));
     up
@@ -51,11 +50,7 @@ fn up(run: &Run) -> Command {
 /// With a `/dev/shm` of their own no other run is there.
 #[test]
 fn a_run_from_elsewhere_is_not_changed_without_its_name() {
-    let permitted = Command::new("unshare").args(["--mount", "true"]).output();
-    if !permitted.is_ok_and(|output| output.status.success()) {
-        println!("skipped: a mount namespace of its own is not permitted here");
-        return;
-    }
+    only_if!(can_mount());
     let run = Run::of_recording().rate(SLOW);
     let script = "mount -t tmpfs tmpfs /dev/shm || exit 9
         here=$1; shift
@@ -110,8 +105,7 @@ pub(crate) fn process<'a>(status: &'a Value, name: &str) -> &'a Value {
 /// A run of six seconds that has begun.
 pub(crate) fn started() -> (Run, Running) {
     let run = Run::of_recording().rate("1");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     (run, running)
 }
 
@@ -178,8 +172,7 @@ fn a_process_is_started_again_on_request() {
     assert_eq!(process(&status, "translation-search")["pid"], after);
     assert_eq!(process(&status, "translation-search")["restarts"], 1);
     ask(&run, &["restart", "steering"]).refused_with(&["steering", "masking"]);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
@@ -187,8 +180,7 @@ fn a_run_that_was_frozen_goes_on_without_a_restart() {
     let run = Run::of_recording()
         .rate(MODERATE)
         .set("run.stall_timeout_s=2");
-    let mut running = run.start();
-    running.await_poses(THIRD / 2);
+    let mut running = run.started(THIRD / 2);
     let supervisor = running.pid();
     let stages: Vec<Pid> = running.await_stages().into_values().collect();
     let all = || [supervisor].into_iter().chain(stages.iter().copied());
@@ -209,8 +201,7 @@ fn a_follower_that_hangs_is_restarted_alone_while_odometry_goes_on() {
         .rate("1")
         .set("slam.kind=graph")
         .set("run.stall_timeout_s=2");
-    let mut running = run.start();
-    running.await_poses(4);
+    let running = run.started(4);
     let status = await_status(&run, "followers", |it| {
         process(it, "loop-closure")["activity"] == "waiting"
     });
@@ -228,23 +219,19 @@ fn a_follower_that_hangs_is_restarted_alone_while_odometry_goes_on() {
 fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running() {
     let run = Run::of_recording();
     let slow = run.clone().rate(SLOW);
-    let mut running = slow.start();
-    running.await_poses(1);
+    let running = slow.started(1);
     // Nothing can be put in its place.
     fs::create_dir(run.out().join("summary.json")).unwrap();
     ask(&run, &["down"]).failed_with(&["results are not written"]);
     assert!(!running.finish().status.success());
     fs::remove_dir(run.out().join("summary.json")).unwrap();
-    let mut running = slow.start();
-    running.await_poses(2);
+    let running = slow.started(2);
     running.kill_supervisor();
     ask(&run, &["down"]).refused_with(&["no run", "and was killed"]);
     let other = Run::of_recording().rate(SLOW);
     let going = other.start();
     await_status(&other, "poses", |it| it["poses"].as_u64() >= Some(1));
-    let mut ps = gyre();
-    ps.args(["ps", "--json"]);
-    let listed = Ended::of(ps).stdout;
+    let listed = finished!["ps", "--json"].stdout;
     assert!(!listed.contains(run.out().to_str().unwrap()), "{listed}");
     ask(&other, &["down"]).succeeded();
     going.finish();
@@ -259,8 +246,7 @@ fn a_stage_that_hangs_is_restarted_alone() {
         .rate(MODERATE)
         // So long that a look at the runs of all tests, on a busy machine, falls into it.
         .set("run.stall_timeout_s=8");
-    let mut running = run.start();
-    running.await_poses(THIRD / 2);
+    let mut running = run.started(THIRD / 2);
     let stages = running.await_stages();
     send(stages["rotation-search"], Signal::STOP);
     // It is silent, or working without end, if it was stopped in its work.
@@ -293,11 +279,7 @@ fn logs_of_a_run_are_lines_of_the_process_that_is_asked_for() {
 
 #[test]
 fn top_shows_the_processes_of_a_run_in_a_terminal() {
-    let version = Command::new("tmux").arg("-V").output();
-    if !version.is_ok_and(|it| it.status.success()) {
-        println!("skipped: there is no tmux");
-        return;
-    }
+    only_if!(can(&["tmux", "-V"]));
     let (run, running) = started();
     let socket = run.folder().join("tmux");
     let tmux = |arguments: &[&str]| {
@@ -327,8 +309,7 @@ fn top_shows_the_processes_of_a_run_in_a_terminal() {
     }
     let text = ask(&run, &["top", "--once", "--every", "0.2"]);
     assert!(text.succeeded().stdout.contains("rotation-search"));
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 /// Reads notifications from a socket, as systemd does, until `STOPPING=1`.

@@ -8,7 +8,7 @@ use std::{
     process::Command,
 };
 
-use crate::common::{Ended, Run, gyre, python, recording};
+use crate::common::{Ended, Run, finished, gyre, python, recording};
 use serde_json::Value;
 
 /// A run of the small recording that is over.
@@ -185,12 +185,7 @@ fn objects_are_evaluated_against_the_truth_of_their_recording() {
     let data = recording::around_a_block();
     let run = Run::small().data(data).set("objects.kind=tracks");
     run.complete();
-    let against = |truth: &Path| {
-        let mut command = gyre();
-        command.args(["evaluate", "--objects"]).arg(run.out());
-        command.arg(truth);
-        Ended::of(command)
-    };
+    let against = |truth: &Path| finished!["evaluate", "--objects", run.out(), truth];
     let printed = against(data);
     assert!(printed.succeeded().stdout.contains("precision"));
     let empty = tempfile::tempdir().unwrap();

@@ -46,15 +46,13 @@ fn an_idle_pipeline_uses_no_time_and_goes_on_afterwards() {
         assert!(used < of / 100, "{name} computed for {used:?} of {of:?}");
     }
     send(source, Signal::CONT);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
 fn shared_memory_stays_within_what_was_announced() {
     let run = Run::of_recording().rate("6");
-    let mut running = run.start();
-    running.await_poses(recording::SCANS / 2);
+    let running = run.started(recording::SCANS / 2);
     let used = running.shared_memory_bytes();
     running.finish().succeeded();
     let summary = run.summary();

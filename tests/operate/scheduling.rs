@@ -35,8 +35,7 @@ fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restar
     let again = running.await_other_stage("masking", stages["masking"]);
     running.await_poses(recording::SCANS / 3);
     assert_eq!(priority(again), (5, "0".to_owned()));
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let refused = Run::of_recording().set("run.scheduling.nice=-21").finish();
     refused.refused_with(&["run", "nice", "-20 to 19"]);
     let processor = Run::of_recording().set("run.scheduling.cpus=[1000]");
@@ -59,15 +58,13 @@ fn processors_wake_within_the_limit_of_the_configuration_as_long_as_the_run_live
         return;
     };
     let run = Run::of_recording().rate(MODERATE).set("run.cpu_wake_us=7");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     assert_eq!(wake_limit(), Some(7));
     running.finish().succeeded();
     assert_eq!(wake_limit(), Some(before));
     assert_eq!(run.odometry(), undisturbed());
     let killed = Run::of_recording().rate(MODERATE).set("run.cpu_wake_us=7");
-    let mut running = killed.start();
-    running.await_poses(2);
+    let running = killed.started(2);
     running.kill_supervisor();
     leftovers::remove(killed.out());
     assert_eq!(wake_limit(), Some(before));

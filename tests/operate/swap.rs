@@ -39,8 +39,7 @@ fn shell_words(words: &[&str]) -> String {
 fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
     // Thirty seconds, since the machine may be busy.
     let run = Run::of_recording().rate("0.2");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     for stage in STAGES {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
         let status = status(&run).unwrap();
@@ -48,8 +47,7 @@ fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
     }
     swap(&run, "masking", &[], &[]).succeeded();
     swap(&run, "rotation-search", &["--cold"], &[]).succeeded();
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let summary = run.summary();
     assert_eq!(summary["swaps"].as_array().unwrap().len(), STAGES.len() + 2);
     assert_eq!(summary["dropped"], 0);
@@ -68,16 +66,14 @@ fn a_program_that_cannot_take_over_changes_nothing() {
     }
     swap(&run, "steering", &[], &["true"]).refused_with(&["steering"]);
     assert_eq!(running.await_stage("masking"), before);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
 fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
     // Twenty seconds, since the machine may be busy.
     let run = Run::of_recording().rate("0.3");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let fails = script(&run, "fails.sh", FAILS);
     let cold = script(&run, "cold.sh", "echo no such mask >&2\nexit 3");
     for (options, program, reason, words) in [
@@ -114,8 +110,7 @@ const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\necho no such mask >&2\n
 fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fails() {
     // A minute, since the machine may be busy.
     let run = Run::of_recording().rate("0.1");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let own = script(&run, "own.sh", &format!("exec {PROGRAM} stage masking"));
     swap(&run, "masking", &[], &[&own]).succeeded();
     let before = process(&status(&run).unwrap(), "masking")["pid"].clone();
@@ -142,16 +137,14 @@ fn a_program_whose_messages_no_stage_can_read_gives_way_and_does_not_end_the_run
         "translation-search died after it",
         "NaN",
     ]);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
 fn a_swap_without_a_scan_to_try_the_program_says_so_with_a_code_of_its_own() {
     // Nothing comes for a minute after the first scans.
     let run = Run::of_recording().rate("0.01");
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     let own = ["nice", PROGRAM, "stage", "rotation-search"];
     let ended = swap(&run, "rotation-search", &[], &own);
     assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
@@ -175,8 +168,7 @@ fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
     while !swap(&run, "masking", &[], &own).status.success() {
         assert!(since.elapsed().as_secs() < 10, "the first one stands by");
     }
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 /// A swap command that has been started.
@@ -212,8 +204,7 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
     }
     assert!(since.elapsed().as_secs() < 40, "{:?}", since.elapsed());
     running.signal(Signal::CONT);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let summary = run.summary();
     assert_eq!(summary["swaps"], Value::Null);
     assert_eq!(summary["restarts"], serde_json::json!({}));
@@ -223,8 +214,7 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
 fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
     // A minute. The swap takes eight seconds, or more on a busy machine.
     let run = Run::of_recording().rate("0.1").set("run.start_timeout_s=8");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let said = said(swapping(&run, &[]));
     let note = "masking continues as before: waiting for 8 s at most (run.start_timeout_s) for `";
     assert!(said.contains(note), "{said}");
@@ -241,8 +231,7 @@ fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
         .rate("0.25")
         .set("run.mode=live")
         .set("source.scans=16");
-    let mut running = run.start();
-    running.await_poses(4);
+    let running = run.started(4);
     for &stage in &STAGES[1..5] {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
     }

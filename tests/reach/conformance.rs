@@ -8,7 +8,7 @@ use gyre_contract::StageId;
 use gyre_stage::Launch;
 use serde_json::Value;
 
-use crate::common::{Ended, gyre, recording};
+use crate::common::{Ended, finished, gyre, recording};
 use stages::BREACH;
 
 /// The report on a program, and the end of the command.
@@ -172,9 +172,7 @@ fn work_that_is_not_in_the_stamps_does_not_pass_a_budget() {
 #[test]
 fn a_command_that_cannot_be_tested_is_refused_in_a_sentence() {
     let refused = |arguments: &[&str], words: &[&str]| {
-        let mut command = gyre();
-        command.arg("conformance").args(arguments);
-        let ended = Ended::of(command);
+        let ended = finished!["conformance"; arguments];
         assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
         let sentence = ended.stderr.strip_prefix("gyre: ").unwrap();
         assert_eq!((sentence.lines().count(), ended.stdout.as_str()), (1, ""));

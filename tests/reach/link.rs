@@ -16,7 +16,7 @@ use std::{
 
 use gyre_journal as journal;
 
-use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
+use crate::common::{Ended, Run, finished, gyre, recording, undisturbed, wrapped};
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// Time for which the link is cut: longer than the time after which a connection is given up.
@@ -90,8 +90,7 @@ fn a_robot_that_begins_anew_is_given_what_the_base_has() {
     let [base, robot] = sides("masked");
     let robot = robot.rate("2");
     let there = base.start();
-    let mut here = robot.start();
-    here.await_poses(8);
+    let here = robot.started(8);
     here.kill_supervisor();
     robot.option("--fresh").start().finish().succeeded();
     there.finish().succeeded();
@@ -112,9 +111,7 @@ fn a_link_off_this_machine_needs_certificates() {
     plain.finish().refused_with(&["unencrypted", "tls/"]);
     let live = side("base", "scan", "link.listen=['tcp/127.0.0.1:7447']").set("run.mode=live");
     live.finish().refused_with(&["link", "masking sheds load"]);
-    let mut command = gyre();
-    command.args(["link", "send", "out", "--listen", "tcp/0.0.0.0:7447"]);
-    Ended::of(command).refused_with(&["unencrypted"]);
+    finished!["link", "send", "out", "--listen", "tcp/0.0.0.0:7447"].refused_with(&["unencrypted"]);
 }
 
 #[test]
@@ -128,8 +125,7 @@ fn a_robot_that_plays_another_drive_is_refused() {
         let robot = robot.set("link.side='robot'").set("link.cut='motion'");
         robot.set(&format!("link.connect=['{address}']"))
     });
-    let mut here = first.start();
-    here.await_poses(6);
+    let here = first.started(6);
     here.kill_supervisor();
     let ended = second.finish();
     ended.failed_with(&["the base has poses of a different drive", "--fresh"]);
@@ -140,8 +136,7 @@ fn a_robot_that_plays_another_drive_is_refused() {
 #[test]
 fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
     let run = Run::of_recording().rate("1");
-    let mut running = run.start();
-    running.await_poses(6);
+    let running = run.started(6);
     let link = Link::new();
     let seen = run.folder().join("seen");
     let mut send = link.end("send", run.out());
@@ -166,8 +161,7 @@ fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
 #[test]
 fn a_sender_that_begins_again_is_gone_on_with() {
     let run = Run::of_recording().rate("0.4");
-    let mut running = run.start();
-    running.await_poses(3);
+    let running = run.started(3);
     let link = Link::new();
     let receiving = link.lose_sender(&run);
     let second = link.start("send", run.out());
@@ -182,15 +176,13 @@ fn a_sender_that_begins_again_is_gone_on_with() {
 #[test]
 fn another_drive_is_not_put_behind_the_one_that_was_received() {
     let run = Run::of_recording().rate("0.4");
-    let mut running = run.start();
-    running.await_poses(3);
+    let running = run.started(3);
     let link = Link::new();
     let receiving = link.lose_sender(&run);
     running.kill_supervisor();
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let later = Run::small().data(other.path()).rate("0.4");
-    let mut running = later.start();
-    running.await_poses(3);
+    let running = later.started(3);
     let mut second = link.end("send", later.out()).spawn().unwrap();
     let received = receiving.join().unwrap();
     received.failed_with(&["the sender plays a different drive now"]);
@@ -202,8 +194,7 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
 fn nobody_connects_without_a_certificate_of_the_authority() {
     let (ours, theirs) = (Certificates::new(), Certificates::new());
     let run = Run::of_recording().rate("0.2");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let address = endpoint().replace("tcp/", "tls/");
     let link = Link { address };
     let sends = |certificates: &Certificates| {

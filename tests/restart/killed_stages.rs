@@ -3,12 +3,12 @@
 
 use std::fs;
 
-use crate::common::{Pid, Run, leftovers, odometry, recording, send, undisturbed};
+use crate::common::{
+    Pid, Run, leftovers, odometry,
+    recording::{MIDDLE, MODERATE},
+    send, undisturbed,
+};
 use rustix::process::Signal;
-
-/// The recording's six seconds in one.
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
 
 /// Stops a process as a replacement may hang that writes no heartbeat.
 fn stop_without_a_heartbeat(run: &Run, name: &str, pid: Pid) {
@@ -86,8 +86,7 @@ fn what_was_computed_before_giving_up_is_kept_and_the_same_command_goes_on() {
         .set("stages.masking.restart.limit=0");
     let mut running = run.start();
     running.await_poses(MIDDLE).kill("masking");
-    let ended = running.finish();
-    ended.failed_with(&[
+    running.finish().failed_with(&[
         "masking died",
         "signal 9",
         "poses are kept",

@@ -11,7 +11,7 @@ use std::{
 use gyre_transport::run::SHARED_MEMORY;
 use tempfile::TempDir;
 
-use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed};
+use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed, with_tmpfs};
 
 /// A run of a short simulation by another user, with a program and results of its own.
 struct Other {
@@ -92,7 +92,7 @@ const FILL: &str = "cat /dev/zero >> /dev/shm/filled-by-another-program";
 
 /// Starts a run with little shared memory of its own, and waits for its first pose.
 fn start_with_little_memory(run: &Run) -> Option<Running> {
-    let command = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m")?;
+    let command = with_tmpfs(&run.command(), Path::new(SHARED_MEMORY), "size=64m")?;
     let mut running = run.start_as(command);
     running.await_poses(1);
     Some(running)
@@ -128,12 +128,10 @@ fn a_run_has_its_memory_before_another_program_fills_the_rest_and_a_restart_with
 fn two_users_run_at_once() {
     let Some(other) = Other::new() else { return };
     let run = Run::of_recording().rate("6");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     other.run().succeeded();
     assert!(!other.runs().exists());
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]

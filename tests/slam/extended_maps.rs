@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use gyre_datasets::read_trajectory;
 use gyre_slam::localisation::Map;
 
-use crate::common::{Ended, Run, gyre};
+use crate::common::{Ended, Run, finished};
 
 fn drive(streets: u64, seed: u64) -> Run {
     let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
@@ -26,10 +26,7 @@ fn first() -> (Run, PathBuf) {
 }
 
 fn draw(run: &Run, out: &Path, options: &[&Path]) -> Ended {
-    let mut command = gyre();
-    command.arg("map").arg(run.out()).arg("--out").arg(out);
-    command.args(options);
-    Ended::of(command)
+    finished!["map", run.out(), "--out", out; options]
 }
 
 fn extend(run: &Run, map: &Path, out: &Path) -> Ended {

@@ -18,7 +18,7 @@ use serde_json::Value;
 
 use super::followers::undisturbed;
 use crate::{
-    common::{Ended, Run, gyre, recording::around_a_block},
+    common::{Run, finished, recording::around_a_block},
     live::gnss::assert_replays,
     observers::record::{WINDOW, recorded},
 };
@@ -162,9 +162,7 @@ fn apart(a: &Origin, b: &Origin) -> (f64, f64) {
 
 fn draw(run: &Run) -> PathBuf {
     let map = run.folder().join("map");
-    let mut command = gyre();
-    command.arg("map").arg(run.out()).arg("--out").arg(&map);
-    Ended::of(command).succeeded();
+    finished!["map", run.out(), "--out", &map].succeeded();
     map
 }
 
@@ -196,17 +194,15 @@ fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
         fs::create_dir(folder).unwrap();
     }
     let [beside, within] = [beside, within].map(|folder| folder.join("drive.mcap"));
-    let mut export = gyre();
-    export.arg("export").arg(around_a_block());
-    export.arg("--mcap").arg(&beside);
-    Ended::of(export).succeeded();
+    finished!["export", around_a_block(), "--mcap", &beside].succeeded();
     with_fixes(&beside, &within);
     let of = |bag: &Path| {
         let run = Run::small().data(bag).set("slam.kind=graph");
         with_antenna(run.set("gnss.kind=auto"))
     };
-    let without = of(&beside).finish();
-    without.refused_with(&["has no messages of sensor_msgs/msg/NavSatFix, and no log"]);
+    of(&beside)
+        .finish()
+        .refused_with(&["has no messages of sensor_msgs/msg/NavSatFix, and no log"]);
     fs::write(beside.with_file_name("gnss.csv"), log(0.0)).unwrap();
     let [of_log, of_bag] = [&beside, &within].map(|bag| recorded(&of(bag).set(WINDOW)));
     assert_eq!(of_bag.complete(), of_log.complete());
@@ -221,15 +217,9 @@ fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
     named
         .finish()
         .refused_with(&["topic /gps/fix", "but on: /fix"]);
-    let mut inspect = gyre();
-    inspect.arg("inspect").arg(&within);
-    let inspected = Ended::of(inspect);
-    inspected.succeeded();
-    assert!(
-        inspected.stdout.contains("gnss          /fix: "),
-        "{}",
-        inspected.stdout
-    );
+    let inspected = finished!["inspect", &within];
+    let said = &inspected.succeeded().stdout;
+    assert!(said.contains("gnss          /fix: "), "{said}");
 }
 
 #[test]

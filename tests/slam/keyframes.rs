@@ -85,8 +85,7 @@ fn a_run_without_slam_logs_no_keyframes_and_removes_those_of_an_earlier_run() {
 fn a_keyframe_without_its_pose_is_cut_off_and_poses_without_their_keyframe_are_computed_again() {
     for lost in ["pose", "keyframe"] {
         let run = run().rate("6");
-        let mut running = run.start();
-        running.await_poses(recording::SCANS / 2);
+        let running = run.started(recording::SCANS / 2);
         running.kill_supervisor();
         if lost == "pose" {
             let (poses, last) = (poses_of(&run), last_keyframe(&run));
@@ -114,8 +113,7 @@ fn last_keyframe(run: &Run) -> u64 {
 #[test]
 fn keyframes_that_are_removed_during_the_run_end_it_in_a_sentence() {
     let run = run().rate("6");
-    let mut running = run.start();
-    running.await_poses(recording::SCANS / 3);
+    let running = run.started(recording::SCANS / 3);
     fs::remove_file(records_path::<Keyframe>(run.out())).unwrap();
     running
         .finish()

@@ -12,7 +12,7 @@ use gyre_datasets::read_trajectory;
 use gyre_geometry::Pose;
 use serde_json::Value;
 
-use crate::common::{Ended, Run, Shared, folder, gyre, recording};
+use crate::common::{Ended, Run, Shared, finished, folder, gyre, recording};
 
 const CONFIGURATION: &str = "[raster]\nn = 255\ncell_m = 0.4\n";
 const TOWN: u64 = 3;
@@ -50,12 +50,7 @@ fn mapped() -> Arc<Run> {
             .data(&first_drive())
             .set("slam.kind=graph");
         run.complete();
-        let mut map = gyre();
-        map.arg("map")
-            .arg(run.out())
-            .args(["--format=folder", "--out"]);
-        map.arg(map_of(&run));
-        Ended::of(map).succeeded();
+        finished!["map", run.out(), "--format=folder", "--out", map_of(&run)].succeeded();
         run
     })
 }

@@ -11,9 +11,9 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
     scene::{Scene, assert_one_sentence},
-    tools::{Mount, can_mount},
+    tools::Mount,
 };
-use crate::common::{OtherUser, Run, assert_nothing_left_of};
+use crate::common::{OtherUser, Run, assert_nothing_left_of, can_mount};
 
 /// More than any results have.
 const PLENTY: u64 = 256 << 20;
