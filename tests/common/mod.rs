@@ -39,6 +39,7 @@ pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
 pub use server::Server;
 pub use shared::Shared;
+pub use spawned::Spawned;
 pub use watch::{Watch, Watched};
 
 /// The stages of a run that does not search jointly, in the order of the stream.

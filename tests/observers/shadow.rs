@@ -1,20 +1,13 @@
 //! `gyre shadow`: a second program beside a stage of a running run. The shadow never changes the
 //! run; its answers are compared.
 
-use std::{
-    fs::{self, File},
-    path::{Path, PathBuf},
-    process::{Child, Stdio},
-    sync::OnceLock,
-    thread,
-    time::{Duration, Instant},
-};
+use std::{fs, path::PathBuf, sync::OnceLock};
 
 use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::{
-    common::{Ended, Pid, Run, Running, gyre, processes, send, undisturbed},
+    common::{Ended, Pid, Run, Running, Spawned, gyre, processes, send, undisturbed},
     input::breaks,
     method::learned_masks::{TWO_SCANS, card},
     operate::commands::{ask, up},
@@ -63,7 +56,7 @@ fn release(running: &Running) {
 
 /// A running shadow, and its output.
 struct Shadow {
-    child: Child,
+    process: Spawned,
     report: PathBuf,
 }
 
@@ -72,40 +65,28 @@ impl Shadow {
     fn start(run: &Run, name: &str, stage: &str, options: &[&str]) -> Self {
         let report = run.folder().join(name);
         fs::create_dir_all(&report).unwrap();
-        let file = |name: &str| File::create(report.join(name)).unwrap();
         let mut command = gyre();
         command.args(["shadow", stage]).arg(run.out());
         command.arg("--report").arg(&report).args(options);
-        command.stdin(Stdio::null());
-        command.stdout(file("stdout")).stderr(file("stderr"));
-        let child = command.spawn().unwrap();
-        Self { child, report }
+        let process = Spawned::new(command, report.join("said"));
+        Self { process, report }
     }
 
     /// Waits until it observes the run.
     fn await_attached(&self) {
-        self.until("attached", |said| said.contains("beside"));
+        self.process
+            .until(|said| said.contains("beside").then_some(()));
     }
 
     /// Waits until it has compared so many items.
     fn await_rows(&self, rows: usize) {
-        self.until("rows", |_| self.rows() >= rows);
-    }
-
-    fn until(&self, what: &str, is_so: impl Fn(&str) -> bool) {
-        let since = Instant::now();
-        let said = || fs::read_to_string(self.report.join("stderr")).unwrap();
-        while !is_so(&said()) {
-            assert!(since.elapsed().as_secs() < 60, "no {what}: {}", said());
-            thread::sleep(Duration::from_millis(10));
-        }
+        self.process.until(|_| (self.rows() >= rows).then_some(()));
     }
 
     /// Waits until it has started a stage.
     fn await_process(&self) -> Pid {
-        let stage = || processes::stages_of(self.child.id()).into_values().next();
-        self.until("process", |_| stage().is_some());
-        stage().unwrap()
+        let stages = || processes::stages_of(self.process.pid());
+        self.process.until(|_| stages().into_values().next())
     }
 
     fn rows(&self) -> usize {
@@ -115,12 +96,12 @@ impl Shadow {
 
     /// Waits until it ends; returns its exit code and its report.
     fn end(mut self) -> (Option<i32>, Value) {
-        let code = self.child.wait().unwrap().code();
-        let said = |name| fs::read_to_string(self.report.join(name)).unwrap();
-        println!("{}\n{}", said("stderr"), said("stdout"));
+        let (code, said) = (self.process.wait().code(), self.process.said());
+        println!("{said}");
         let report = fs::read_to_string(self.report.join("shadow.json"));
         let report: Value = serde_json::from_str(&report.unwrap()).unwrap();
-        if let Ok(printed) = serde_json::from_str::<Value>(&said("stdout")) {
+        if let Some(at) = said.find("\n{") {
+            let printed: Value = serde_json::from_str(&said[at..]).unwrap();
             assert_eq!(printed, report);
         }
         assert_accounted(&report["counts"]);
@@ -296,18 +277,16 @@ fn an_interrupted_shadow_reports_and_the_program_of_a_killed_one_ends() {
     let [interrupted, mut killed] =
         ["interrupted", "killed"].map(|name| Shadow::start(&run, name, "rotation-search", &[]));
     interrupted.await_rows(1);
-    send(interrupted.child.id(), Signal::INT);
+    interrupted.process.signal(Signal::INT);
     let (code, report) = interrupted.end();
     assert_eq!((code, &report["verdict"]), (Some(0), &"identical".into()));
     killed.await_rows(1);
     let process = killed.await_process();
-    send(killed.child.id(), Signal::KILL);
-    killed.child.wait().unwrap();
-    let since = Instant::now();
-    while Path::new("/proc").join(process.to_string()).exists() {
-        assert!(since.elapsed().as_secs() < 30, "it outlives its shadow");
-        thread::sleep(Duration::from_millis(10));
-    }
+    killed.process.kill();
+    // It does not outlive its shadow.
+    killed
+        .process
+        .until(|_| (!processes::is_alive(process)).then_some(()));
     release(&running);
     assert_eq!(running.complete(), undisturbed());
 }

@@ -9,36 +9,25 @@ use std::{
 };
 
 use gyre_transport::run::SHARED_MEMORY;
-use tempfile::TempDir;
 
 use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed, with_tmpfs};
 
-/// A run of a short simulation by another user, with a program and results of its own.
-struct Other {
-    folder: TempDir,
-    user: OtherUser,
-}
+/// A run of a short simulation by another user. `None` if this user cannot become another.
+struct Other(Run, OtherUser);
 
 impl Other {
-    /// `None` if this user cannot become another.
     fn new() -> Option<Self> {
-        let folder = tempfile::tempdir().unwrap();
-        let user = OtherUser::new(folder.path())?;
-        let configuration = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n";
-        fs::write(folder.path().join("test.toml"), configuration).unwrap();
-        Some(Self { folder, user })
+        let run = Run::simulated(8);
+        let user = OtherUser::new(run.folder())?;
+        Some(Self(run, user))
     }
 
     fn run(&self) -> Ended {
-        let mut command = self.user.gyre();
-        command
-            .current_dir(self.folder.path())
-            .args(["run", "test.toml"]);
-        Ended::of(command)
+        Ended::of(self.1.command_of(&self.0))
     }
 
     fn runs(&self) -> PathBuf {
-        Path::new(SHARED_MEMORY).join(format!("gyre-{}", self.user.id))
+        Path::new(SHARED_MEMORY).join(format!("gyre-{}", self.1.id))
     }
 }
 

@@ -1,20 +1,21 @@
 //! The followers of a run with SLAM: faults of followers do not affect odometry, and the followers
 //! write the same bytes.
 
-use std::{fs, sync::OnceLock};
+use std::fs;
 
 use gyre_contract::FollowerId;
-use gyre_slam::{Keyframe, Query, RecordReader, records_path};
+use gyre_slam::{Query, RecordReader};
 use rustix::process::Signal;
 
-use crate::common::{
-    Run, Watch, finished,
-    recording::{SCANS_AROUND as SCANS, around_a_block},
-    send,
+use crate::{
+    common::{
+        Run, Watch, finished,
+        recording::{MODERATE, SCANS_AROUND as SCANS, around_a_block},
+        send,
+    },
+    restart::faults::configurations::loops,
 };
 
-/// The recording's thirty seconds in five: followers are disturbed while scans come.
-const MODERATE: &str = "6";
 const LOOP_CLOSURE: &str = FollowerId::LoopClosure.name();
 const TRAJECTORY: &str = FollowerId::Trajectory.name();
 
@@ -24,47 +25,6 @@ fn without_slam() -> Run {
 
 fn run() -> Run {
     without_slam().set("slam.kind=graph")
-}
-
-/// The results of a run that must be the same.
-#[derive(PartialEq)]
-pub struct Left {
-    odometry: String,
-    keyframes: Vec<u8>,
-    loops: Vec<u8>,
-    /// `trajectory_slam.tum` and `loops.csv`.
-    pub corrected: [String; 2],
-    map: Vec<u8>,
-}
-
-impl Left {
-    fn by(run: &Run) -> Self {
-        Self {
-            odometry: run.odometry(),
-            keyframes: fs::read(records_path::<Keyframe>(run.out())).unwrap(),
-            loops: fs::read(records_path::<Query>(run.out())).unwrap(),
-            corrected: ["trajectory_slam.tum", "loops.csv"].map(|name| run.result(name)),
-            map: fs::read(run.out().join("map.png")).unwrap(),
-        }
-    }
-}
-
-pub fn undisturbed() -> &'static Left {
-    static LEFT: OnceLock<Left> = OnceLock::new();
-    LEFT.get_or_init(|| {
-        let run = run();
-        run.complete();
-        Left::by(&run)
-    })
-}
-
-fn assert_undisturbed(run: &Run, case: &str) {
-    let (left, undisturbed) = (Left::by(run), undisturbed());
-    assert!(left.odometry == undisturbed.odometry, "{case}: odometry");
-    assert!(left.keyframes == undisturbed.keyframes, "{case}: keyframes");
-    assert!(left.loops == undisturbed.loops, "{case}: loops");
-    assert!(left.corrected == undisturbed.corrected, "{case}: corrected");
-    assert!(left.map == undisturbed.map, "{case}: map");
 }
 
 fn loops_of(run: &Run) -> usize {
@@ -91,7 +51,7 @@ fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_e
         .await_words("waiting for loop-closure: 0 of 0 records");
     send(pid, Signal::CONT);
     running.finish().succeeded();
-    assert_undisturbed(&run, "stopped");
+    loops().assert_undisturbed(&run, "stopped");
     assert_eq!(restarts(&run, LOOP_CLOSURE), 0);
 }
 
@@ -106,12 +66,13 @@ fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
     running.signal(Signal::INT);
     let ended = running.finish();
     assert_eq!(ended.code(), Some(130));
-    assert!(slow.odometry() == undisturbed().odometry);
+    let odometry = without_slam().complete();
+    assert!(slow.odometry() == odometry);
     let run = run().into(slow.out());
     let ended = run.finish();
     ended.succeeded();
     assert!(ended.stderr.contains("resuming after"), "{}", ended.stderr);
-    assert_undisturbed(&run, "resumed");
+    loops().assert_undisturbed(&run, "resumed");
 }
 
 #[test]
@@ -138,10 +99,10 @@ fn assert_made_up_for(follower: &str) {
     ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);
     let goes_on = format!("odometry continues without {follower}");
     assert!(ended.stderr.contains(&goes_on), "{}", ended.stderr);
-    assert!(run.odometry() == undisturbed().odometry);
+    assert!(run.odometry() == without_slam().complete());
     fs::remove_file(broken).unwrap();
     run.complete();
-    assert_undisturbed(&run, follower);
+    loops().assert_undisturbed(&run, follower);
 }
 
 #[test]

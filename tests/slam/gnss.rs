@@ -16,7 +16,6 @@ use mcap::{MessageStream, WriteOptions, records::MessageHeader};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::Value;
 
-use super::followers::undisturbed;
 use crate::{
     common::{Run, finished, recording::around_a_block},
     live::gnss::assert_replays,
@@ -228,8 +227,10 @@ fn a_clock_that_is_wrong_is_refused_and_told() {
     let run = run(6.0);
     run.finish()
         .failed_with(&["the fixes of GNSS are not used", "gnss.delay_s"]);
-    let [corrected, _] = &undisturbed().corrected;
-    assert_eq!(&run.result("trajectory_slam.tum"), corrected);
+    let without = without();
+    without.complete();
+    let corrected = "trajectory_slam.tum";
+    assert_eq!(run.result(corrected), without.result(corrected));
     let gnss = &run.summary()["gnss"];
     assert_eq!(gnss["used"], 0, "{gnss}");
     assert!(gnss.get("origin").is_none(), "{gnss}");

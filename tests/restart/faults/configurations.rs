@@ -29,6 +29,7 @@ const CORRECTED: &[&str] = &[
     "trajectory_slam.tum",
     "loops.csv",
     "graph.g2o",
+    "map.png",
     "journal/keyframes.log",
     "journal/loops.log",
 ];
@@ -128,6 +129,13 @@ impl Configuration {
         let cell = RUNS.lock().unwrap().entry(self.name).or_default().clone();
         cell.get_or_init(|| Arc::new(self.run_undisturbed()))
             .clone()
+    }
+
+    /// Asserts that the results of a run are those of the undisturbed one.
+    pub fn assert_undisturbed(&self, run: &Run, case: &str) {
+        let undisturbed = self.undisturbed();
+        let difference = undisturbed.results.difference(&self.results(run));
+        assert_eq!(difference, None, "{case}");
     }
 
     fn run_undisturbed(&self) -> Undisturbed {
