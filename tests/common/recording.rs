@@ -168,11 +168,6 @@ pub fn truncate(image: &Path, bytes: usize) {
     replace(image, &whole[..bytes.min(whole.len())]);
 }
 
-pub fn resize(image: &Path, width: u32, height: u32) {
-    let black = vec![0; (width * height) as usize];
-    replace(image, &encoded(width, height, &black));
-}
-
 fn encoded(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);

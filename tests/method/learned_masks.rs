@@ -6,7 +6,6 @@ use std::{
 };
 
 use crate::common::{Run, odometry, recording, runtime_is_installed, undisturbed};
-use gyre_masking::networks::runtime;
 
 const ONE_SCAN: &str = "single-127";
 pub const TWO_SCANS: &str = "pair-127";
@@ -55,21 +54,6 @@ fn gyre_allocates_nothing_for_a_scan_but_what_onnx_runtimes_binding_does() {
         assert_eq!(*allocations, OF_THE_BINDING * scans);
         assert_eq!(stages["refinement"]["allocations_after_five"], 0);
     }
-}
-
-#[test]
-fn an_onnx_runtime_that_is_named_but_not_there_is_refused_and_other_masks_still_work() {
-    let run = masked_by(ONE_SCAN);
-    let without = |run: &Run| {
-        let mut command = run.command();
-        command.env("ORT_DYLIB_PATH", "/no/such/libonnxruntime.so");
-        run.start_as(command).finish()
-    };
-    without(&run).refused_with(&[
-        "ORT_DYLIB_PATH is /no/such/libonnxruntime.so",
-        runtime::INSTALL,
-    ]);
-    without(&Run::of_recording()).succeeded();
 }
 
 #[test]

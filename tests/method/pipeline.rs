@@ -1,9 +1,9 @@
 //! `gyre run` as a whole: six processes, the same result every time, whatever interrupts it.
 
-use std::{collections::BTreeSet, fs, process::Command};
+use std::{collections::BTreeSet, process::Command};
 
 use crate::common::{
-    Run, STAGES, assert_nothing_left, odometry,
+    Run, STAGES, assert_nothing_left, leftovers, odometry, processes,
     recording::{self, MIDDLE, MODERATE},
     undisturbed,
 };
@@ -11,7 +11,8 @@ use rustix::process::Signal;
 
 #[test]
 fn six_processes_of_their_own_are_there_while_it_runs() {
-    let mut running = Run::of_recording().rate(MODERATE).start();
+    let run = Run::of_recording().rate(MODERATE);
+    let mut running = run.start();
     let stages = running.await_stages();
     assert_eq!(
         stages.keys().map(String::as_str).collect::<BTreeSet<_>>(),
@@ -19,12 +20,9 @@ fn six_processes_of_their_own_are_there_while_it_runs() {
     );
     let pids: BTreeSet<_> = stages.values().copied().chain([running.pid()]).collect();
     assert_eq!(pids.len(), STAGES.len() + 1, "{stages:?}");
-    for pid in stages.values() {
-        let environment = fs::read(format!("/proc/{pid}/environ")).unwrap();
-        assert!(
-            String::from_utf8_lossy(&environment).contains(&running.mark()),
-            "the run's place is named after --out"
-        );
+    for pid in stages.into_values() {
+        // Its place is named after --out.
+        assert_eq!(processes::run_of(pid), Some(leftovers::root(run.out())));
     }
     running.finish().succeeded();
 }
@@ -75,39 +73,10 @@ fn all_results_are_there_and_account_for_every_scan() {
 }
 
 #[test]
-fn a_run_without_truth_leaves_no_judgement_of_an_earlier_one() {
-    let judged = Run::of_recording();
-    judged.complete();
-    let copy = recording::copy(recording::SCANS);
-    fs::remove_dir_all(copy.path().join("gt")).unwrap();
-    let unjudged = Run::of_recording_named(copy.path().to_str().unwrap())
-        .option("--fresh")
-        .into(judged.out());
-    unjudged.complete();
-    assert!(unjudged.summary()["evaluation"].is_null());
-    for plot in ["errors.svg", "bands.svg"] {
-        assert!(!judged.out().join(plot).exists(), "{plot}");
-    }
-}
-
-#[test]
 fn a_repetition_gives_the_same_bytes() {
     let run = Run::of_recording();
     assert_eq!(run.complete(), undisturbed());
     assert_eq!(run.complete(), undisturbed(), "in the same folder");
-}
-
-#[test]
-fn the_resolved_configuration_repeats_the_run() {
-    let run = Run::of_recording()
-        .set("masking.threshold=70")
-        .set("rotation.window=hann");
-    let odometry = run.complete();
-    assert_ne!(odometry, undisturbed());
-    assert_eq!(
-        Run::of_file(&run.out().join("config.toml")).complete(),
-        odometry
-    );
 }
 
 #[test]

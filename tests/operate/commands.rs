@@ -21,11 +21,8 @@ use crate::{
     reach::only_if,
 };
 
-/// The recording's six seconds in two.
-const MODERATE: &str = "3";
-/// The same in twenty: time for commands, also while other tests keep the machine busy.
+/// The recording's six seconds in twenty: time for commands, also while other tests keep the machine busy.
 const SLOW: &str = "0.3";
-const THIRD: usize = recording::SCANS / 3;
 
 /// A command about a run.
 pub(crate) fn ask(run: &Run, arguments: &[&str]) -> Ended {
@@ -176,46 +173,6 @@ fn a_process_is_started_again_on_request() {
 }
 
 #[test]
-fn a_run_that_was_frozen_goes_on_without_a_restart() {
-    let run = Run::of_recording()
-        .rate(MODERATE)
-        .set("run.stall_timeout_s=2");
-    let mut running = run.started(THIRD / 2);
-    let supervisor = running.pid();
-    let stages: Vec<Pid> = running.await_stages().into_values().collect();
-    let all = || [supervisor].into_iter().chain(stages.iter().copied());
-    all().for_each(|pid| send(pid, Signal::STOP));
-    thread::sleep(Duration::from_secs(4));
-    // The supervisor looks first.
-    send(supervisor, Signal::CONT);
-    thread::sleep(Duration::from_millis(100));
-    stages.iter().for_each(|pid| send(*pid, Signal::CONT));
-    running.finish().succeeded();
-    assert_eq!(run.summary()["restarts"], serde_json::json!({}));
-    assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-fn a_follower_that_hangs_is_restarted_alone_while_odometry_goes_on() {
-    let run = Run::of_recording()
-        .rate("1")
-        .set("slam.kind=graph")
-        .set("run.stall_timeout_s=2");
-    let running = run.started(4);
-    let status = await_status(&run, "followers", |it| {
-        process(it, "loop-closure")["activity"] == "waiting"
-    });
-    let pid = process(&status, "loop-closure")["pid"].as_u64().unwrap() as Pid;
-    send(pid, Signal::STOP);
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("loop-closure hangs"), "{ended:?}");
-    let restarts = run.summary()["restarts"].clone();
-    assert_eq!(restarts, serde_json::json!({ "loop-closure": 1 }));
-    assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
 fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running() {
     let run = Run::of_recording();
     let slow = run.clone().rate(SLOW);
@@ -241,26 +198,25 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
 }
 
 #[test]
-fn a_stage_that_hangs_is_restarted_alone() {
-    let run = Run::of_recording()
-        .rate(MODERATE)
-        // So long that a look at the runs of all tests, on a busy machine, falls into it.
-        .set("run.stall_timeout_s=8");
-    let mut running = run.started(THIRD / 2);
-    let stages = running.await_stages();
-    send(stages["rotation-search"], Signal::STOP);
-    // It is silent, or working without end, if it was stopped in its work.
-    await_status(&run, "hanging", |it| {
-        let stage = process(it, "rotation-search");
-        let hangs = stage["activity"] == "silent" || stage["activity_s"].as_f64() > Some(0.5);
-        hangs && process(it, "masking")["activity"] == "waiting"
-    });
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("rotation-search hangs"), "{ended:?}");
-    let restarts = run.summary()["restarts"].clone();
-    assert_eq!(restarts, serde_json::json!({ "rotation-search": 1 }));
-    assert_eq!(run.odometry(), undisturbed());
+fn a_stage_or_a_follower_that_hangs_is_restarted_alone() {
+    for name in ["rotation-search", "loop-closure"] {
+        let run = Run::of_recording()
+            .rate("1")
+            .set("slam.kind=graph")
+            .set("run.stall_timeout_s=2");
+        let running = run.started(4);
+        let status = await_status(&run, "followers", |it| {
+            process(it, "loop-closure")["activity"] == "waiting"
+        });
+        let pid = process(&status, name)["pid"].as_u64().unwrap() as Pid;
+        send(pid, Signal::STOP);
+        let ended = running.finish();
+        ended.succeeded();
+        ended.says(&format!("{name} hangs"));
+        let restarts = run.summary()["restarts"].clone();
+        assert_eq!(restarts, serde_json::json!({ name: 1 }));
+        assert_eq!(run.odometry(), undisturbed());
+    }
 }
 
 #[test]
@@ -330,7 +286,7 @@ fn systemd_is_notified_when_a_run_is_ready_alive_and_stopping() {
     let socket = UnixDatagram::bind(&path).unwrap();
     let limit = Some(Duration::from_secs(60));
     socket.set_read_timeout(limit).unwrap();
-    let run = Run::of_recording().rate(MODERATE);
+    let run = Run::of_recording().rate("3");
     let mut command = run.command();
     command.env("NOTIFY_SOCKET", &path);
     command.env("WATCHDOG_USEC", "400000");

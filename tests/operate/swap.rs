@@ -211,20 +211,6 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
 }
 
 #[test]
-fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
-    // A minute. The swap takes eight seconds, or more on a busy machine.
-    let run = Run::of_recording().rate("0.1").set("run.start_timeout_s=8");
-    let running = run.started(2);
-    let said = said(swapping(&run, &[]));
-    let note = "masking continues as before: waiting for 8 s at most (run.start_timeout_s) for `";
-    assert!(said.contains(note), "{said}");
-    assert!(said.contains("it did not get ready"), "{said}");
-    assert_eq!(status(&run).unwrap()["swap"], Value::Null);
-    ask(&run, &["down"]).succeeded();
-    running.end();
-}
-
-#[test]
 fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
     // A scan each second: the window of four gives a loaded machine time.
     let run = Run::of_recording()

@@ -3,10 +3,13 @@
 
 use std::{fs, os::unix::fs::symlink, path::Path};
 
-use crate::common::{
-    Ended, Run, finished,
-    recording::{self, MIDDLE, MODERATE},
-    undisturbed, with_mount,
+use crate::{
+    common::{
+        Ended, Run, finished,
+        recording::{self, MIDDLE, MODERATE},
+        undisturbed, with_mount,
+    },
+    restart::faults::configurations,
 };
 
 pub fn interrupted() -> Run {
@@ -232,21 +235,24 @@ fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
 
 #[test]
 fn a_journal_that_is_removed_during_the_run_ends_it_and_is_named() {
-    for replace in [
-        |path: &Path| fs::remove_file(path),
-        |path: &Path| {
-            fs::write(path.with_extension("new"), "")
-                .and_then(|()| fs::rename(path.with_extension("new"), path))
-        },
+    for (slam, name, is_replaced) in [
+        ("none", "poses.journal", false),
+        ("none", "poses.journal", true),
+        ("graph", "keyframes.log", false),
     ] {
-        let run = Run::of_recording().rate(MODERATE);
-        let running = run.started(MIDDLE);
-        let journal = run.out().join("journal/poses.journal");
-        replace(&journal).unwrap();
-        running
-            .finish()
-            .failed_with(&["cannot keep", "poses.journal", "removed or replaced"]);
+        let run = Run::of_recording().set(&format!("slam.kind={slam}"));
+        let running = run.clone().rate(MODERATE).started(MIDDLE);
+        let journal = run.out().join("journal").join(name);
+        fs::remove_file(&journal).unwrap();
+        if is_replaced {
+            fs::write(&journal, "").unwrap();
+        }
+        running.finish().failed_with(&[name, "removed or replaced"]);
         assert!(!run.out().join("journal/complete").exists());
+        if slam == "graph" {
+            run.complete();
+            configurations::slam().assert_undisturbed(&run, name);
+        }
     }
 }
 

@@ -1,23 +1,22 @@
 //! GNSS: fixes change no byte of odometry, the corrected trajectory is the same after any kill, and
 //! the map agrees with the fixes.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::PathBuf};
 
 use gyre_datasets::read_trajectory;
 use gyre_geometry::samples::{Geographic, LocalPlane};
 use gyre_radar::Trajectory;
-use gyre_ros2_messages::{Ros2Message, encode, sensor_msgs::NavSatFix, std_msgs::Header};
+
 use gyre_slam::mapping::{Map, Origin};
-use mcap::{MessageStream, WriteOptions, records::MessageHeader};
+
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::Value;
 
 use crate::{
-    common::{Run, finished, recording::around_a_block},
+    common::{
+        Run, finished,
+        recording::{around_a_block, linked},
+    },
     live::gnss::assert_replays,
     observers::record::{WINDOW, recorded},
 };
@@ -72,37 +71,6 @@ pub fn log(delay_s: f64) -> String {
         text += &format!("{stamp_ns},{latitude},{longitude},{SIGMA_M}\n");
     }
     text
-}
-
-fn with_fixes(of: &Path, to: &Path) {
-    let (bytes, file) = (fs::read(of).unwrap(), fs::File::create(to).unwrap());
-    let mut bag = WriteOptions::new().profile("ros2").create(file).unwrap();
-    for message in MessageStream::new(&bytes).unwrap() {
-        bag.write(&message.unwrap()).unwrap();
-    }
-    let definition = NavSatFix::DEFINITION;
-    let (name, text) = (definition.type_name(), definition.text());
-    let schema = bag.add_schema(&name, "ros2msg", text.as_bytes()).unwrap();
-    let channel = bag.add_channel(schema, "/fix", "cdr", &BTreeMap::new());
-    let channel_id = channel.unwrap();
-    let mut fix = NavSatFix {
-        position_covariance_type: 2,
-        ..NavSatFix::default()
-    };
-    (fix.position_covariance[0], fix.position_covariance[4]) = (SIGMA_M.powi(2), SIGMA_M.powi(2));
-    for (stamp_ns, place) in fixes(0.0) {
-        fix.header = Header::new(stamp_ns, "gnss");
-        (fix.latitude, fix.longitude) = (place.latitude_deg, place.longitude_deg);
-        let header = MessageHeader {
-            channel_id,
-            sequence: 0,
-            log_time: stamp_ns as u64,
-            publish_time: stamp_ns as u64,
-        };
-        let bytes = encode(&fix).unwrap();
-        bag.write_to_known_channel(&header, &bytes).unwrap();
-    }
-    bag.finish().unwrap();
 }
 
 fn without() -> Run {
@@ -186,39 +154,14 @@ fn odometry_is_the_same_and_the_map_lies_where_the_fixes_say() {
 }
 
 #[test]
-fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let [beside, within] = ["beside", "within"].map(|name| folder.path().join(name));
-    for folder in [&beside, &within] {
-        fs::create_dir(folder).unwrap();
-    }
-    let [beside, within] = [beside, within].map(|folder| folder.join("drive.mcap"));
-    finished!["export", around_a_block(), "--mcap", &beside].succeeded();
-    with_fixes(&beside, &within);
-    let of = |bag: &Path| {
-        let run = Run::small().data(bag).set("slam.kind=graph");
-        with_antenna(run.set("gnss.kind=auto"))
-    };
-    of(&beside)
-        .finish()
-        .refused_with(&["has no messages of sensor_msgs/msg/NavSatFix, and no log"]);
-    fs::write(beside.with_file_name("gnss.csv"), log(0.0)).unwrap();
-    let [of_log, of_bag] = [&beside, &within].map(|bag| recorded(&of(bag).set(WINDOW)));
-    assert_eq!(of_bag.complete(), of_log.complete());
-    assert_eq!(left(&of_bag), left(&of_log));
-    assert_replays(&of_log);
-    assert_replays(&of_bag);
-    let gnss = &of_bag.summary()["gnss"];
-    assert_eq!(gnss["topic"], "/fix", "{gnss}");
-    assert_eq!(gnss["faults"]["zero"], 1, "{gnss}");
-    assert!(gnss["used"].as_u64().unwrap() > 60, "{gnss}");
-    let named = of(&within).set("gnss.topic='/gps/fix'");
-    named
-        .finish()
-        .refused_with(&["topic /gps/fix", "but on: /fix"]);
-    let inspected = finished!["inspect", &within];
-    let said = &inspected.succeeded().stdout;
-    assert!(said.contains("gnss          /fix: "), "{said}");
+fn a_log_beside_the_scans_is_used_and_kept_beside_their_recording() {
+    let drive = linked(around_a_block(), |_| true);
+    fs::write(drive.path().join("gnss.csv"), log(0.0)).unwrap();
+    let run = Run::small().data(drive.path()).set("slam.kind=graph");
+    let run = recorded(&with_antenna(run.set("gnss.kind=auto")).set(WINDOW));
+    run.complete();
+    assert!(run.summary()["gnss"]["used"].as_u64() > Some(60));
+    assert_replays(&run);
 }
 
 #[test]

@@ -94,19 +94,6 @@ fn last_keyframe(run: &Run) -> u64 {
     keyframes.read(last).unwrap().seq
 }
 
-#[test]
-fn keyframes_that_are_removed_during_the_run_end_it_in_a_sentence() {
-    let run = run().rate("6");
-    let running = run.started(recording::SCANS / 3);
-    fs::remove_file(records_path::<Keyframe>(run.out())).unwrap();
-    running
-        .finish()
-        .failed_with(&["keyframes.log", "removed or replaced", "poses are kept"]);
-    assert!(!run.out().join("journal/complete").exists());
-    run.complete();
-    slam().assert_undisturbed(&run, "removed keyframes");
-}
-
 /// The run has ended, and its results are still to be written.
 #[test]
 fn results_without_keyframes_say_so() {
