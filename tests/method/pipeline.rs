@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, process::Command};
 
 use crate::common::{
-    Run, STAGES, assert_nothing_left, leftovers, odometry, processes,
+    Run, STAGES, leftovers, odometry, processes,
     recording::{self, MIDDLE, MODERATE},
     undisturbed,
 };
@@ -124,21 +124,6 @@ fn two_runs_at_once_do_not_disturb_each_other() {
     slow.finish().succeeded();
     assert_eq!(runs[0].odometry(), undisturbed());
     assert_eq!(runs[1].odometry(), alone);
-}
-
-#[test]
-fn a_stage_may_have_a_command_of_its_own() {
-    // The second one keeps a shell in between.
-    for last in [
-        "exec '{gyre}' stage masking",
-        "'{gyre}' stage masking; exit $?",
-    ] {
-        let script = format!("touch $0.ran; {last}");
-        let run = Run::of_recording().stage_script("masking", &script);
-        assert_eq!(run.complete(), undisturbed());
-        assert!(run.folder().join("masking.sh.ran").is_file());
-        assert_nothing_left(run.out());
-    }
 }
 
 #[test]

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::{
     common::{
-        Ended, Run, Running, finished, gyre, odometry, processes, python, real_data,
+        Ended, Run, Running, finished, odometry, processes, python, real_data,
         recording::{SCANS, around_a_block},
         send, undisturbed, with_tmpfs,
     },
@@ -280,26 +280,6 @@ fn a_recording_holds_what_sensors_measured_and_replays_with_and_without_it() {
         assert_eq!(replay(&file(&run), &["--set", setting]), alone);
         assert_ne!(alone, odometry);
     }
-}
-
-#[test]
-fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
-    let run = played().rate("1").set("run.window=1");
-    let running = run.started(SCANS / 3);
-    let mut record = gyre();
-    record.arg("record").arg(run.out());
-    record.args(["--topics", "scan,masked", "--to"]);
-    record.arg(file(&run));
-    let mut recorder = record.spawn().unwrap();
-    running.finish().succeeded();
-    recorder.wait().unwrap();
-    let recording = open_recording(&file(&run)).unwrap();
-    let scans = seqs(&recording, "scan");
-    assert!(!scans.is_empty() && scans[0] > 0, "{scans:?}");
-    // A scan before the recorder came is not there, and the stages after `masked` need it.
-    let replay = Run::small().data(&file(&run)).argument("--from", "masked");
-    let lacks = "lacks message 0 of topic `masked`";
-    replay.finish().refused_with(&[lacks]);
 }
 
 #[test]

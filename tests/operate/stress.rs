@@ -118,23 +118,6 @@ fn a_generous_budget_is_kept_and_an_impossible_one_is_named() {
 }
 
 #[test]
-fn a_source_that_is_stopped_shows_in_sensor_to_pose_although_its_service_time_hides_it() {
-    let stress = Stress::new();
-    let words = ["--scenario", "stopped", "--stage", "radar-replay"];
-    let words = [&words[..], &["--duration", "6"]].concat();
-    stress.run(&words).succeeded();
-    let figures = &stress.outcome()["figures"];
-    assert_eq!(figures["faults"][0]["stage"], "radar-replay");
-    let open = number(&figures["sensor_to_pose"]["max_ms"]);
-    let closed = number(&figures["closed_loop"]["max_ms"]);
-    // The stage is stopped for 1 s. Up to a period passes before the next scan is due.
-    assert!(open >= 1e3 * (1.0 - PERIOD_S), "{open} ms");
-    assert!(closed < 0.7 * open, "{closed} ms of {open} ms");
-    assert!(figures["counts"]["dropped"].as_u64() > Some(0));
-    assert_eq!(figures["counts"]["due"], 24);
-}
-
-#[test]
 fn the_sensors_clock_goes_on_while_its_source_is_dead() {
     let stress = Stress::new();
     let words = ["--scenario", "kills", "--stage", "radar-replay"];

@@ -9,7 +9,7 @@ use rustix::process::Signal;
 
 use crate::{
     common::{
-        Run, Watch, finished,
+        Run, Watch,
         recording::{MODERATE, SCANS_AROUND as SCANS, around_a_block},
         send,
     },
@@ -131,19 +131,4 @@ fn loops_and_corrections_can_be_watched() {
     assert_eq!(loops.seqs, (0..loops_of(&run) as u64).collect::<Vec<_>>());
     assert!(corrections.seqs.is_sorted_by(|a, b| a < b));
     assert!(corrections.seqs.len() > SCANS / 10);
-}
-
-#[test]
-fn a_topic_that_the_run_does_not_have_is_refused_with_its_key() {
-    for (run, topic, key) in [
-        (run(), "fix", "slam.map"),
-        (without_slam(), "loop", "slam.kind"),
-    ] {
-        let run = run.rate(MODERATE);
-        let running = run.started(1);
-        let refused = format!("has no topic `{topic}`");
-        finished!["echo", run.out(), topic].failed_with(&[&refused, key]);
-        running.signal(Signal::INT);
-        running.finish();
-    }
 }

@@ -231,7 +231,7 @@ configurations! {
     }
     /// The same with the fixes of a GNSS receiver.
     gnss: loops() => {
-        run: |_| gnss::run(0.0),
+        run: |_| gnss::run(),
         stateful: TRAJECTORY,
         figures: &["/gnss/used", "/gnss/refused", "/gnss/faults", "/gnss/origin"],
         shows: &[("/gnss/used", 60.0)],
