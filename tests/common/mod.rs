@@ -322,9 +322,7 @@ impl Run {
 
     /// Starts it at a rate, and interrupts it after so many poses.
     pub fn interrupt(&self, rate: &str, poses: usize) {
-        let running = self.clone().rate(rate).started(poses);
-        running.signal(rustix::process::Signal::INT);
-        assert_eq!(running.finish().code(), Some(130));
+        self.clone().rate(rate).started(poses).interrupt();
     }
 
     /// Starts it, waits until it ends well, and returns its `odometry.csv`.

@@ -131,6 +131,14 @@ impl Running {
         run.odometry()
     }
 
+    /// Ends the run as Ctrl-C does.
+    pub fn interrupt(self) -> Ended {
+        self.signal(Signal::INT);
+        let ended = self.finish();
+        assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+        ended
+    }
+
     /// Waits until the run ends, perhaps by a signal, which leaves its files to the next run.
     pub fn end(mut self) -> Ended {
         let status = self.process.wait();

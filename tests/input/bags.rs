@@ -116,8 +116,7 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
     let exported = export(whole.path(), &path, &["--scans", "b-scan,fft"]);
     exported.succeeded();
 
-    let said = &exported.stdout;
-    assert!(said.contains("/radar_data/fft_data 9600"), "{said}");
+    exported.prints("/radar_data/fft_data 9600");
     let words = [
         "scans on several topics",
         "--set dataset.topic=/radar_data/",

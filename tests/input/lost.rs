@@ -100,9 +100,7 @@ fn a_run_that_waits_for_its_input_can_be_interrupted() {
     let running = run.started(MIDDLE);
     take_away(recording.path());
     thread::sleep(Duration::from_millis(300));
-    running.signal(Signal::INT);
-    let ended = running.finish();
-    assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+    running.interrupt();
     bring_back(recording.path());
     run.complete();
     assert_whole(&run);
@@ -174,8 +172,7 @@ fn a_recording_with_many_damaged_scans_gives_results_but_no_success() {
     let (_recording, run) = damaged((1..recording::SCANS).step_by(3));
     let ended = run.finish();
     ended.failed_with(&["8 of the 24 scans", "cannot be read", "log.jsonl"]);
-    let said = &ended.stdout;
-    assert!(said.contains("complete but for unreadable scans"), "{said}");
+    ended.prints("complete but for unreadable scans");
     assert_eq!(run.summary()["processed"], 16);
 }
 

@@ -207,8 +207,7 @@ fn a_radar_that_is_not_there_yet_is_waited_for_and_a_signal_ends_the_wait() {
     let mut running = run.start();
     running.await_words(&waits);
     ask(&run, &["ps", "--check"]).refused_with(&[&waits]);
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
+    running.interrupt();
     let mut running = run.start();
     running.await_words(&waits);
     let _radar = Radar::to(&["--listen", &free], recording::small(), &[]);

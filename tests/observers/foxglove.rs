@@ -8,7 +8,6 @@ use std::{
     process::Command,
 };
 
-use rustix::process::Signal;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -101,8 +100,7 @@ fn a_viewer_receives_the_scans_of_the_recording_and_the_motions_of_the_results()
     viewer.args(["-c", VIEW, &server.foxglove(), "8"]);
     let ended = Ended::of(viewer);
     ended.succeeded();
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
+    running.interrupt();
     server.interrupt();
 
     let received: Value = serde_json::from_str(&ended.stdout).unwrap();
@@ -208,8 +206,7 @@ fn viewers_of_other_sites_and_machines_need_the_token() {
     let lichtblick = [SDK, "Origin: http://lichtblick.example"];
     assert_eq!(status(&url, &format!("?{query}"), &lichtblick), "101");
     closed.interrupt();
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
+    running.interrupt();
 }
 
 #[test]

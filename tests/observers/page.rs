@@ -2,10 +2,8 @@
 
 use std::{thread, time::Duration};
 
-use rustix::process::Signal;
-
 use crate::{
-    common::{Browser, Run, Running, Server},
+    common::{Browser, Run, Server},
     operate::commands::ask,
 };
 
@@ -18,11 +16,6 @@ fn long() -> Run {
 fn small(scans: usize) -> Run {
     let run = Run::of_recording().set("source.repeat=true");
     run.set(&format!("source.scans={scans}"))
-}
-
-fn interrupt(running: Running) {
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
 }
 
 fn status(answer: &str) -> &str {
@@ -68,7 +61,7 @@ fn other_machines_need_the_token_and_this_one_none() {
     let bearer = format!("Authorization: Bearer {token}");
     assert!(status(&server.get("/metrics", &[&bearer])).contains("200"));
     server.interrupt();
-    interrupt(running);
+    running.interrupt();
 }
 
 #[test]
@@ -123,7 +116,7 @@ fn metrics_count_poses_delays_and_restarts() {
     }
     assert!(metrics.contains("content-type: application/openmetrics-text"));
     assert!(metrics.trim_end().ends_with("# EOF"), "{metrics}");
-    interrupt(running);
+    running.interrupt();
     server.interrupt();
 }
 
@@ -149,7 +142,7 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
     let poses = browser.evaluate(POSES).as_f64().unwrap();
     browser.until(&format!("{POSES} > {}", poses + 4.0));
     fits_a_phone(&mut browser);
-    interrupt(running);
+    running.interrupt();
     browser.until("document.getElementById('state').textContent === 'Ended early'");
     let banner = browser.text("banner");
     assert!(banner.contains("The same command continues it"));

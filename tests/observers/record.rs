@@ -76,9 +76,7 @@ pub fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
 #[test]
 fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
     let run = recorded(&played()).set(ALL);
-    let ended = run.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("missed nothing"), "{}", ended.stderr);
+    run.finish().succeeded().says("missed nothing");
     assert_eq!(run.odometry(), undisturbed());
     let recording = open_recording(&file(&run)).unwrap();
     for topic in ["scan", "masked", "rotation", "motion", "refined", "pose"] {
@@ -105,9 +103,7 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
     let killed = await_recorder(&mut running, None);
     send(killed, Signal::KILL);
     await_recorder(&mut running, Some(killed));
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("started again"), "{}", ended.stderr);
+    running.finish().succeeded().says("started again");
     assert_eq!(run.odometry(), undisturbed());
     assert_eq!(parts(&file(&run)).len(), 2);
     let recording = open_recording(&file(&run)).unwrap();
@@ -309,7 +305,7 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
     let ended = recorded.start_as(command).finish();
     ended.succeeded();
     for part in ["No space left", "the run continues"] {
-        assert!(ended.stderr.contains(part), "{}", ended.stderr);
+        ended.says(part);
     }
     assert_eq!(run.odometry(), undisturbed());
 }

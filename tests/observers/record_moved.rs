@@ -39,8 +39,7 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     let rest = open_recording(&file(&run)).unwrap();
     assert!(rest.absent_parts().contains(&1));
     let inspected = finished!["inspect", file(&run)];
-    let said = &inspected.stdout;
-    assert!(said.contains("Part 1 of the recording"), "{said}");
+    inspected.prints("Part 1 of the recording");
     let left = parts(&file(&run));
     for part in &left {
         fs::rename(part, other_disk.join(part.file_name().unwrap())).unwrap();

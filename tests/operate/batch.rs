@@ -213,7 +213,7 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     assert_eq!(ended.code(), Some(1));
     assert_eq!(calm.outcomes(), OUTCOMES);
     let said = "9 drives: 4 complete, 1 corrupt, 1 unsure, 3 failed";
-    assert!(ended.stdout.contains(said), "{}", ended.stdout);
+    ended.prints(said);
     // A line for each.
     let lines = |words: &str| ended.stderr.lines().filter(|it| it.contains(words)).count();
     for words in [
@@ -297,16 +297,17 @@ fn a_drive_is_computed_again_with_another_configuration_alone() {
     };
     batch.finish().succeeded();
     let first = changed();
-    let again = batch.finish();
-    let said = &again.succeeded().stdout;
-    assert!(said.contains("1 had been computed before"), "{said}");
+    batch
+        .finish()
+        .succeeded()
+        .prints("1 had been computed before");
     assert_eq!(changed(), first);
 
     let other = batch.clone().with(&["--set", "search.kind='exhaustive'"]);
     let collected = other.clone().with(&["--collect"]).finish();
     assert_eq!(collected.code(), Some(1));
     let reason = "part-6: not-run: it was computed with other settings";
-    assert!(collected.stderr.contains(reason), "{}", collected.stderr);
+    collected.says(reason);
     let ended = other.finish();
     let said = &ended.succeeded().stdout;
     assert!(!said.contains("before"), "{said}");
@@ -402,7 +403,6 @@ fn a_full_disk_of_the_whole_batch_ends_it_and_the_same_command_continues() {
         return;
     };
     assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
-    let said = &ended.stderr;
-    assert!(said.contains("No space left on device"), "{said}");
+    ended.says("No space left on device");
     batch.finish().succeeded();
 }

@@ -128,7 +128,7 @@ fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
     }
     let failed = check();
     assert_eq!(failed.status.code(), Some(1));
-    assert!(failed.stderr.contains("masking is silent"), "{failed:?}");
+    failed.says("masking is silent");
     send(masking, Signal::CONT);
     ask(&run, &["down"]).succeeded();
     running.finish();
@@ -138,9 +138,7 @@ fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
 #[test]
 fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
     let run = Run::of_recording().rate(SLOW);
-    let started = Ended::of(up(&run));
-    let said = &started.succeeded().stdout;
-    assert!(said.contains("6 processes"), "{said}");
+    Ended::of(up(&run)).succeeded().prints("6 processes");
     let status = await_status(&run, "poses", |status| status["poses"].as_u64() >= Some(4));
     assert_eq!(status["phase"], "running");
     let names = status["processes"].as_array().unwrap().iter();
@@ -210,9 +208,7 @@ fn a_stage_or_a_follower_that_hangs_is_restarted_alone() {
         });
         let pid = process(&status, name)["pid"].as_u64().unwrap() as Pid;
         send(pid, Signal::STOP);
-        let ended = running.finish();
-        ended.succeeded();
-        ended.says(&format!("{name} hangs"));
+        running.finish().succeeded().says(&format!("{name} hangs"));
         let restarts = run.summary()["restarts"].clone();
         assert_eq!(restarts, serde_json::json!({ name: 1 }));
         assert_eq!(run.odometry(), undisturbed());
@@ -226,9 +222,9 @@ fn logs_of_a_run_are_lines_of_the_process_that_is_asked_for() {
     recording::truncate(&images[3], 1000);
     let run = Run::of_recording_named(copy.path().to_str().unwrap());
     run.finish();
-    let lines = ask(&run, &["logs", "radar-replay"]);
-    let said = &lines.succeeded().stdout;
-    assert!(said.contains("WARN radar-replay: skipped"), "{said}");
+    ask(&run, &["logs", "radar-replay"])
+        .succeeded()
+        .prints("WARN radar-replay: skipped");
     assert_eq!(ask(&run, &["logs", "refinement"]).succeeded().stdout, "");
     ask(&run, &["logs", "steering"]).refused_with(&["steering", "refinement"]);
 }

@@ -118,9 +118,7 @@ fn a_table_and_all_plots_come_of_an_odometry() {
 #[test]
 fn a_run_reports_the_same_as_its_evaluation() {
     let run = Run::of_recording();
-    let ended = run.finish();
-    let said = &ended.succeeded().stdout;
-    assert!(said.contains("covariance    23 motions"), "{said}");
+    run.finish().succeeded().prints("covariance    23 motions");
     let (reported, evaluated) = (&run.summary()["evaluation"], json(evaluate(&run)));
     for place in [
         "/ate/rmse_m",
@@ -177,7 +175,7 @@ fn an_odometry_of_another_drive_beside_the_trajectory_is_left_out_with_the_reaso
     let said = &ended.succeeded().stdout;
     assert!(!said.contains("covariance"), "{said}");
     let reason = "odometry.csv is not evaluated: its stamps are not the estimate's";
-    assert!(ended.stderr.contains(reason), "{}", ended.stderr);
+    ended.says(reason);
 }
 
 #[test]

@@ -149,7 +149,7 @@ fn a_swap_without_a_scan_to_try_the_program_says_so_with_a_code_of_its_own() {
     let ended = swap(&run, "rotation-search", &[], &own);
     assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
     let reason = "no scan has gone through it";
-    assert!(ended.stderr.contains(reason), "{}", ended.stderr);
+    ended.says(reason);
     ask(&run, &["down"]).succeeded();
     running.end();
 }

@@ -167,9 +167,8 @@ fn a_sender_that_begins_again_is_gone_on_with() {
     let second = link.start("send", run.out());
     running.finish().succeeded();
     let received = receiving.join().unwrap();
-    let said = &received.succeeded().stderr;
     let all = format!("{} pose", recording::SCANS);
-    assert!(said.contains(&all), "{said}");
+    received.succeeded().says(&all);
     second.join().unwrap().succeeded();
 }
 

@@ -84,8 +84,9 @@ fn logs_that_cannot_be_written_do_not_disturb_a_run() {
         std::os::unix::fs::symlink(Path::new("/dev/full"), &log).unwrap();
     }
     let command = wrapped(&["env", "GYRE_LOG=trace"], &run.command());
-    let ended = run.start_as(command).finish();
-    ended.succeeded();
-    ended.does_not_say("died");
+    run.start_as(command)
+        .finish()
+        .succeeded()
+        .does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
 }

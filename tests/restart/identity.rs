@@ -67,9 +67,7 @@ fn a_stage_restarted_after_a_rebuild_is_still_the_program_that_the_run_was_begun
     running.await_poses(MIDDLE);
     replace(&program, "#!/bin/sh\necho another program >&2\nexit 7\n");
     running.kill("masking").kill("pose-integration");
-    let ended = running.finish();
-    ended.succeeded();
-    ended.does_not_say("another program");
+    running.finish().succeeded().does_not_say("another program");
     assert_eq!(run.odometry(), undisturbed());
 }
 

@@ -41,8 +41,7 @@ fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journa
     );
     fs::remove_dir(&csv).unwrap();
     let ended = run.finish();
-    ended.succeeded();
-    ended.says("all 24 poses");
+    ended.succeeded().says("all 24 poses");
     ended.does_not_say("pid");
     assert_eq!(run.odometry(), undisturbed());
     let summary = run.summary();

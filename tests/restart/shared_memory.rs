@@ -94,9 +94,7 @@ fn a_run_has_its_memory_before_another_program_fills_the_rest_and_a_restart_with
         return;
     };
     in_shared_memory_of(running.pid(), FILL);
-    let ended = running.finish();
-    ended.succeeded();
-    ended.does_not_say("died");
+    running.finish().succeeded().does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
 
     let run = Run::of_recording().rate("2");

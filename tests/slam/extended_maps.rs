@@ -41,9 +41,9 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     let second = drive(9).set("simulation.scans=64").set("source.first=20");
     second.complete();
     let out = second.folder().join("map");
-    let ended = extend(&second, &map, &out);
-    let said = &ended.succeeded().stderr;
-    assert!(said.contains("keyframes were found in"), "{said}");
+    extend(&second, &map, &out)
+        .succeeded()
+        .says("keyframes were found in");
     let [earlier, all] = [&map, &out].map(|folder| Map::open(folder).unwrap());
     let count = earlier.keyframes().len();
     for (kept, keyframe) in all.keyframes().iter().zip(earlier.keyframes()) {

@@ -63,15 +63,11 @@ fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
     running
         .await_poses(SCANS)
         .await_words("waiting for loop-closure: ");
-    running.signal(Signal::INT);
-    let ended = running.finish();
-    assert_eq!(ended.code(), Some(130));
+    running.interrupt();
     let odometry = without_slam().complete();
     assert!(slow.odometry() == odometry);
     let run = run().into(slow.out());
-    let ended = run.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("resuming after"), "{}", ended.stderr);
+    run.finish().succeeded().says("resuming after");
     loops().assert_undisturbed(&run, "resumed");
 }
 
@@ -98,7 +94,7 @@ fn assert_made_up_for(follower: &str) {
     let died = format!("{follower} died 3 times");
     ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);
     let goes_on = format!("odometry continues without {follower}");
-    assert!(ended.stderr.contains(&goes_on), "{}", ended.stderr);
+    ended.says(&goes_on);
     assert!(run.odometry() == without_slam().complete());
     fs::remove_file(broken).unwrap();
     run.complete();
@@ -112,9 +108,7 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
     let mut running = run.start();
     let given_up = format!("odometry continues without {LOOP_CLOSURE}");
     running.await_words(&given_up).await_poses(2);
-    running.signal(Signal::INT);
-    let ended = running.finish();
-    assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+    running.interrupt();
     assert_eq!(run.summary()["ending"], "interrupted");
 }
 
