@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::{
     common::{
-        Ended, Run, Running, finished, odometry, processes, python, real_data,
+        Ended, Run, Running, finished, odometry, processes, python,
         recording::{SCANS, around_a_block},
         send, undisturbed, with_tmpfs,
     },
@@ -89,6 +89,9 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
         let odometry = replay(&file(&run), &["--from", topic]);
         assert_eq!(odometry, undisturbed(), "from {topic}");
     }
+    let other = Run::configured("").data(&file(&run));
+    let other = other.set("dataset.range_offset_m=0.5").finish();
+    other.refused_with(&["range_offset_m", "that they were recorded with"]);
     let inspected = finished!["inspect", "--json", file(&run)];
     let report: Value = serde_json::from_str(&inspected.succeeded().stdout).unwrap();
     assert_eq!(report["format"], "mcap");
@@ -308,25 +311,6 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
         ended.says(part);
     }
     assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-fn real_scans_replay_to_the_same_bytes() {
-    let Some(data) = real_data("radiate-2019-02-12") else {
-        return;
-    };
-    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = Run::of_file(&configuration).data(&data);
-    let run = run.set("source.scans=20").set(WINDOW);
-    let run = recorded(&run).set(ALL);
-    let odometry = run.complete();
-    assert_eq!(replay(&file(&run), &[]), odometry);
-    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
-    let configured = Run::of_file(&configuration).data(&file(&run));
-    assert_eq!(configured.complete(), odometry);
-    let other = configured.set("dataset.range_offset_m=0.5");
-    let words = ["range_offset_m", "that they were recorded with"];
-    other.finish().refused_with(&words);
 }
 
 /// Prints the objects of a recording, as the Python package `mcap` decodes them by their schema: of

@@ -8,7 +8,7 @@ use gyre_journal as journal;
 use gyre_recording::{open_recording, parts};
 use rustix::process::Signal;
 
-use super::record::{WINDOW, await_recorder, file, recorded, replay};
+use super::record::{WINDOW, await_recorder, file, recorded};
 use crate::common::{Run, recording, send};
 
 const SCANS: usize = 70;
@@ -21,58 +21,6 @@ fn played() -> Run {
     let run = run.rate("2").set(&format!("source.scans={SCANS}"));
     let run = run.set("run.mode=live").set(WINDOW).set(TOPICS);
     recorded(&run.set("stages.refinement.delay_ms=180"))
-}
-
-/// Asserts that the recording contains the results: item by item, and by a replay of each complete
-/// topic. Returns the missing items.
-fn assert_is_of(run: &Run) -> BTreeMap<&'static str, usize> {
-    let recording = open_recording(&file(run)).unwrap();
-    let items = |topic| -> BTreeMap<u64, (u64, i64)> {
-        let entries = recording.entries(topic);
-        let items = entries.map(|entry| (entry.seq, (entry.scan, entry.stamp_ns)));
-        items.collect()
-    };
-    let poses = items("pose");
-    assert!(poses.len() > 20, "{}", poses.len());
-    let generations: Vec<u32> = recording.entries("pose").map(|it| it.generation).collect();
-    assert!(generations.is_sorted());
-    assert!(generations.last() > generations.first(), "{generations:?}");
-    let scans: BTreeMap<u64, i64> = items("scan").into_values().collect();
-    for (scan, stamp_ns) in poses.values() {
-        assert!(scans.get(scan).is_none_or(|it| it == stamp_ns), "{scan}");
-    }
-    let missed = recording.missed();
-    let mut lacking = BTreeMap::new();
-    for topic in ["masked", "rotation", "motion", "refined"] {
-        let recorded = items(topic);
-        for (seq, item) in &recorded {
-            assert_eq!(poses.get(seq), Some(item), "{topic} {seq}");
-        }
-        let lacks = poses.len() - recorded.len();
-        assert!(lacks as u64 <= missed.get(topic).copied().unwrap_or_default());
-        match lacks {
-            0 => assert_eq!(
-                replay(&file(run), &["--from", topic]),
-                run.odometry(),
-                "from {topic}"
-            ),
-            _ => drop(lacking.insert(topic, lacks)),
-        }
-    }
-    lacking
-}
-
-#[test]
-#[ignore = ".ci/nightly: kills at many moments"]
-fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
-    let run = played();
-    let mut running = run.started(12);
-    let recorder = await_recorder(&mut running, None);
-    send(recorder, Signal::KILL);
-    running.kill("masking");
-    running.finish().succeeded();
-    assert_eq!(parts(&file(&run)).len(), 2);
-    assert!(!assert_is_of(&run).contains_key("masked"));
 }
 
 /// The scans of the poses in the results by their numbers.

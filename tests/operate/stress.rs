@@ -10,7 +10,7 @@ use std::{
 };
 
 use gyre_client::{Usage, control::Control, memory};
-use gyre_simulator::{GyroProfile, Profile, SimulationConfig};
+
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -234,15 +234,9 @@ fn what_a_killed_run_has_left_is_not_measured() {
 
 /// A drive of 15 s with the logs of a gyro and of wheels.
 fn with_gyro_and_wheels() -> PathBuf {
-    let mut config = SimulationConfig {
-        scans: Some(60),
-        ..SimulationConfig::default()
-    };
-    config.sensor.profile = Profile::Cts350xRadiate;
-    config.drive.speed_mps = 8.0;
-    config.gyro.profile = GyroProfile::Asm330lhh;
-    config.wheels.rate_hz = 50.0;
-    recording::of("stressed-gyro-and-wheels", &config)
+    let settings = "scans = 60\nsensor.profile = 'cts350x-radiate'\ndrive.speed_mps = 8.0\n\
+        gyro.profile = 'asm330lhh'\nwheels.rate_hz = 50.0\n";
+    recording::configured("stressed-gyro-and-wheels", settings)
 }
 
 const BOTH: [&str; 4] = ["--set", "gyro.kind=auto", "--set", "wheels.kind=auto"];

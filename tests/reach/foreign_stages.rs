@@ -6,7 +6,6 @@ mod stages;
 use std::{env, process};
 
 use gyre_stage::Launch;
-use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
 
 use crate::common::{Run, recording};
 use stages::{FAULT, FAULTY, Fault, ONCE};
@@ -50,7 +49,9 @@ fn a_message_that_no_stage_may_send_is_refused_by_the_name_of_its_sender() {
             continue;
         }
         ended.failed_with(&["giving up"]);
-        assert_numbers(&run, fault);
+        let odometry = run.odometry();
+        let are_numbers = !odometry.contains("NaN") && !odometry.contains("inf");
+        assert!(are_numbers, "{fault}: {odometry}");
         let processed = run.summary()["processed"].as_u64().unwrap();
         assert!(processed <= FAULTY, "{fault}: {processed} poses");
     }
@@ -63,52 +64,6 @@ fn a_fault_that_does_not_come_again_costs_a_restart() {
     assert!(!run.odometry().contains("NaN"));
     assert_eq!(run.summary()["processed"], recording::SCANS);
     assert_ne!(run.summary()["restarts"], serde_json::json!({}));
-}
-
-#[test]
-fn a_source_that_reads_slower_than_the_stages_work_is_no_stall() {
-    let run = run_with("radar-replay", "scan read_ms 300", false);
-    let run = run.rate("max").set("run.stall_timeout_s=1.5");
-    run.finish().succeeded();
-    assert_eq!(run.summary()["restarts"], serde_json::json!({}));
-}
-
-/// Numbers that break most contracts, and some that keep them.
-const NUMBERS: [&str; 6] = ["NaN", "-inf", "-1", "1e300", "0", "0.5"];
-
-/// Runs with a stage that writes a number anywhere into a header: the run names the stage, or no
-/// harm is done.
-#[test]
-fn any_word_of_a_header_is_refused_or_harmless() {
-    let stages = [
-        ("masking", "masked"),
-        ("rotation-search", "rotation"),
-        ("translation-search", "motion"),
-        ("refinement", "refined"),
-    ];
-    for seed in 0..4_u64 {
-        let mut random = StdRng::seed_from_u64(seed);
-        let (stage, topic) = stages[seed as usize % stages.len()];
-        let (word, number) = (random.random_range(0..64), NUMBERS.choose(&mut random));
-        let fault = format!("{topic} word-{word} {}", number.unwrap());
-        println!("seed {seed}: {fault}");
-        let run = run_with(stage, &fault, false);
-        let ended = run.finish();
-        if !ended.status.success() {
-            let unsure = "hardly measured this trajectory";
-            let is_unsure = ended.stderr.contains(unsure);
-            ended.failed_with(&[if is_unsure { unsure } else { stage }]);
-            continue;
-        }
-        assert_eq!(run.summary()["processed"], recording::SCANS, "{fault}");
-        assert_numbers(&run, &fault);
-    }
-}
-
-fn assert_numbers(run: &Run, fault: &str) {
-    let odometry = run.odometry();
-    let are_numbers = !odometry.contains("NaN") && !odometry.contains("inf");
-    assert!(are_numbers, "{fault}: {odometry}");
 }
 
 /// Not a test: the program of a replaced stage, if the environment requests it.

@@ -1,8 +1,7 @@
 //! Stages that send a fault: each does only the minimum for its topic.
 
-use std::{env, path::Path, thread, time::Duration};
+use std::{env, path::Path};
 
-use bytemuck::Pod;
 use gyre_contract::{
     Item, Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined,
     Rotation, Scan, ScanHeader, StageId, compose, flag,
@@ -72,22 +71,7 @@ impl Fault {
     }
 }
 
-impl Fault {
-    /// Replaces a word of a header behind its item, if that is the fault.
-    fn edit<H: Pod>(&self, header: &mut H, seq: u64) {
-        let word = self.field.strip_prefix("word-");
-        let Some(word) = word.map(|word| word.parse::<usize>().unwrap()) else {
-            return;
-        };
-        let words = &mut bytemuck::bytes_of_mut(header)[size_of::<Item>()..];
-        let word = word % (words.len() / 8) * 8;
-        if let Some(value) = self.of(&self.field, seq) {
-            words[word..word + 8].copy_from_slice(&value.to_le_bytes());
-        }
-    }
-}
-
-/// A stage whose messages `$write` writes, and which edits their headers.
+/// A stage whose messages `$write` writes.
 macro_rules! foreign {
     ($name:ident $hop:ident $inputs:ty, $view:ident<$($of:ident),+> => $output:ident, $write:ident) => {
         struct $name(Fault);
@@ -102,8 +86,7 @@ macro_rules! foreign {
                 input: $view<'_, $($of),+>,
                 output: &mut Draft<$output>,
             ) -> Result<(), RunError> {
-                let seq = $write(&self.0, &input, output);
-                self.0.edit(output.header(), seq);
+                $write(&self.0, &input, output);
                 Ok(())
             }
         }
@@ -115,36 +98,24 @@ foreign!(ForeignRotation RotationSearch Pairs<Masked>, PairView<Masked> => Rotat
 foreign!(ForeignTranslation TranslationSearch Joined<Masked, Rotation>, JoinedView<Masked, Rotation> => Motion, translate);
 foreign!(ForeignRefinement Refinement Joined<Masked, Motion>, JoinedView<Masked, Motion> => Refined, refine);
 
-fn rotate(fault: &Fault, input: &PairView<'_, Masked>, output: &mut Draft<Rotation>) -> u64 {
-    let seq = input.current.item().seq;
-    if let Some(value) = fault.of("angle", seq) {
+fn rotate(fault: &Fault, input: &PairView<'_, Masked>, output: &mut Draft<Rotation>) {
+    if let Some(value) = fault.of("angle", input.current.item().seq) {
         output.header().rotation.angle_rad = value;
     }
-    seq
 }
 
-fn translate(
-    fault: &Fault,
-    input: &JoinedView<'_, Masked, Rotation>,
-    output: &mut Draft<Motion>,
-) -> u64 {
+fn translate(fault: &Fault, input: &JoinedView<'_, Masked, Rotation>, output: &mut Draft<Motion>) {
     let item = input.pair.current.item();
     if !item.is(flag::BREAK) {
         output.header().motion = motion(fault, item.seq, input.pair.interval_ns());
     }
-    item.seq
 }
 
-fn refine(
-    fault: &Fault,
-    input: &JoinedView<'_, Masked, Motion>,
-    output: &mut Draft<Refined>,
-) -> u64 {
+fn refine(fault: &Fault, input: &JoinedView<'_, Masked, Motion>, output: &mut Draft<Refined>) {
     let (item, searched) = (input.pair.current.item(), input.other.header().motion);
     if !item.is(flag::BREAK) {
         output.header().motion = motion(fault, item.seq, searched.interval_ns);
     }
-    item.seq
 }
 
 fn motion(fault: &Fault, seq: u64, interval_ns: i64) -> MotionEstimate {
@@ -159,7 +130,7 @@ fn motion(fault: &Fault, seq: u64, interval_ns: i64) -> MotionEstimate {
     }
 }
 
-fn mask(fault: &Fault, input: &PairView<'_, Scan>, output: &mut Draft<Masked>) -> u64 {
+fn mask(fault: &Fault, input: &PairView<'_, Scan>, output: &mut Draft<Masked>) {
     let seq = input.current.item().seq;
     let (header, values) = output.parts::<f32>();
     values.fill(0.0);
@@ -172,7 +143,6 @@ fn mask(fault: &Fault, input: &PairView<'_, Scan>, output: &mut Draft<Masked>) -
         points: 1,
         ..MaskedHeader::default()
     };
-    seq
 }
 
 /// Plays the recording, with a fault in one header.
@@ -212,9 +182,6 @@ impl Source for ForeignSource {
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> Result<(), Unreadable> {
-        if self.fault.field == "read_ms" {
-            thread::sleep(Duration::from_millis(self.fault.value as u64));
-        }
         let geometry = self.dataset.read(index, header.slot(bytes)).unwrap();
         header.set_geometry(&geometry);
         let fault = |field: &str| self.fault.of(field, index as u64);

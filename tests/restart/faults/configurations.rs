@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_contract::FollowerId;
-use gyre_simulator::{GyroProfile, OutputFormat, Profile, SimulationConfig};
+
 use serde_json::Value;
 
 use crate::{
@@ -370,22 +370,13 @@ const WHEELS_LATE_S: f64 = 0.2;
 /// A recording as RADIATE has them, with the log of a gyro whose clock is late and whose host
 /// stalls and loses samples, and with the log of wheels, which slip. The radar goes blind.
 fn with_logs() -> PathBuf {
-    let mut config = SimulationConfig {
-        scans: Some(recording::SCANS),
-        ..SimulationConfig::default()
-    };
-    config.sensor.profile = Profile::Cts350xRadiate;
-    config.output.format = Some(OutputFormat::Radiate);
-    config.drive.speed_mps = 5.0;
-    config.sensor.lost_azimuths = true;
-    config.gyro.profile = GyroProfile::Asm330lhh;
-    config.gyro.delay_s = LATE_S;
-    config.gyro.faults = true;
-    config.wheels.rate_hz = 20.0;
-    config.wheels.delay_s = WHEELS_LATE_S;
-    config.wheels.faults = true;
-    config.blind_s = Some([2.5, 4.5]);
-    recording::of("gyro-and-wheels", &config)
+    let gyro = format!("{{ profile = 'asm330lhh', delay_s = {LATE_S}, faults = true }}");
+    let wheels = format!("{{ rate_hz = 20.0, delay_s = {WHEELS_LATE_S}, faults = true }}");
+    let settings = format!(
+        "{}sensor.lost_azimuths = true\nblind_s = [2.5, 4.5]\ngyro = {gyro}\nwheels = {wheels}\n",
+        recording::RADIATE
+    );
+    recording::configured("gyro-and-wheels", &settings)
 }
 
 pub fn with_gyro() -> Run {
@@ -395,15 +386,9 @@ pub fn with_gyro() -> Run {
 
 /// A recording of a radar whose chirps alternate, in a tunnel from the third second on.
 fn in_a_tunnel() -> PathBuf {
-    let mut config = SimulationConfig {
-        scans: Some(recording::SCANS),
-        ..SimulationConfig::default()
-    };
-    config.sensor.profile = Profile::Ras6;
-    config.output.format = Some(OutputFormat::Boreas);
-    config.drive.speed_mps = 8.0;
-    config.tunnel_m = Some([24.0, 100.0]);
-    recording::of("chirps-alternate", &config)
+    let settings = "scans = 24\nsensor.profile = 'ras6'\noutput.format = 'boreas'\n\
+        drive.speed_mps = 8.0\ntunnel_m = [24.0, 100.0]\n";
+    recording::configured("chirps-alternate", settings)
 }
 
 /// The run of the same recording without its velocities.
