@@ -81,9 +81,7 @@ fn a_repetition_gives_the_same_bytes() {
 
 #[test]
 fn the_resolved_configuration_plays_the_data_that_were_named_instead_of_a_simulation() {
-    let run =
-        Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 3\nseed = 5\n");
-    let run = run.data(recording::small());
+    let run = Run::simulated(3).data(recording::small());
     assert_eq!(run.complete(), undisturbed());
     assert_eq!(
         Run::of_file(&run.out().join("config.toml")).complete(),

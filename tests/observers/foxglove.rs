@@ -8,6 +8,7 @@ use std::{
     process::Command,
 };
 
+use gyre_client::Usage;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -221,9 +222,10 @@ fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
     let request = serde_json::json!({"op": "subscribe", "subscriptions": channels});
     stalled.write_all(&frame(&request.to_string())).unwrap();
     running.await_poses(20);
-    let early = own_bytes(server.pid());
+    let own_bytes = || Usage::of(server.pid()).unwrap().own_bytes;
+    let early = own_bytes();
     running.await_poses(recording::SCANS_AROUND);
-    let late = own_bytes(server.pid());
+    let late = own_bytes();
     assert_eq!(running.complete(), undisturbed);
     // A hundred scans and rasters are more than twice that.
     assert!(late < early + (16 << 20), "from {early} to {late} bytes");
@@ -234,14 +236,4 @@ fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
 fn frame(text: &str) -> Vec<u8> {
     let length = (text.len() as u16).to_be_bytes();
     [&[0x81, 0xfe][..], &length, &[0; 4], text.as_bytes()].concat()
-}
-
-/// Private memory of a process, without the mapped memory of the run.
-fn own_bytes(pid: u32) -> u64 {
-    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("RssAnon:"));
-    let kilobytes = line.unwrap().trim().trim_end_matches(" kB");
-    kilobytes.parse::<u64>().unwrap() << 10
 }

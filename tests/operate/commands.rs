@@ -16,7 +16,7 @@ use crate::{
     PROGRAM,
     common::{
         Ended, Pid, Run, Running, STAGES, assert_nothing_left, can, can_mount, finished, folder,
-        gyre, recording, send, undisturbed,
+        gyre, processes, recording, send, undisturbed,
     },
     reach::only_if,
 };
@@ -144,9 +144,8 @@ fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
     let names = status["processes"].as_array().unwrap().iter();
     assert!(names.map(|it| it["name"].as_str().unwrap()).eq(STAGES));
     let pid = status["pid"].as_u64().unwrap() as Pid;
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    let session = stat.rsplit_once(") ").unwrap().1.split(' ').nth(3).unwrap();
-    assert_eq!(session, pid.to_string(), "it has left the terminal");
+    let session = &processes::stat(pid).unwrap()[3];
+    assert_eq!(*session, pid.to_string(), "it has left the terminal");
     ask(&run, &["down"]).succeeded();
     assert_nothing_left(run.out());
     assert!(!ask(&run, &["down"]).status.success());

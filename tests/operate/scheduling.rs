@@ -2,7 +2,7 @@
 
 use std::{fs, io::Read};
 
-use crate::common::{OtherUser, Pid, Run, leftovers, recording, undisturbed};
+use crate::common::{OtherUser, Pid, Run, leftovers, processes, recording, undisturbed};
 
 /// The recording's six seconds in two.
 const MODERATE: &str = "3";
@@ -11,9 +11,7 @@ const WAKE_LIMIT: &str = "/dev/cpu_dma_latency";
 
 /// The niceness of a process and the processors that it may use.
 fn priority(pid: Pid) -> (i32, String) {
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    let (_, fields) = stat.rsplit_once(") ").unwrap();
-    let nice = fields.split(' ').nth(16).unwrap();
+    let nice = &processes::stat(pid).unwrap()[16];
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
     let mut lines = status.lines();
     let cpus = lines.find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
@@ -72,8 +70,7 @@ fn processors_wake_within_the_limit_of_the_configuration_as_long_as_the_run_live
 
 #[test]
 fn a_run_that_may_not_keep_processors_awake_does_not_start() {
-    let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n")
-        .set("run.cpu_wake_us=0");
+    let run = Run::simulated(8).set("run.cpu_wake_us=0");
     let Some(user) = OtherUser::new(run.folder()) else {
         return;
     };
