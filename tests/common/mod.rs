@@ -3,7 +3,7 @@
 //! left nothing behind.
 
 // Each test binary uses its own part of this.
-#![allow(dead_code, unused_imports, clippy::unwrap_used)]
+#![allow(dead_code, unused_imports, unused_macros, clippy::unwrap_used)]
 
 mod browser;
 mod ended;
@@ -36,7 +36,7 @@ pub use ended::Ended;
 pub use leftovers::{assert_nothing_left, assert_nothing_left_of};
 pub use other_user::OtherUser;
 pub use processes::{Pid, cpu_time, send};
-pub use running::Running;
+pub use running::{Running, poses_of};
 pub use server::Server;
 pub use shared::Shared;
 pub use spawned::Spawned;
@@ -265,11 +265,9 @@ impl Run {
     /// The same with an executable shell script for a stage; `{gyre}` in it stands for the program
     /// under test.
     pub fn stage_script(self, stage: &str, script: &str) -> Self {
-        use std::os::unix::fs::PermissionsExt;
         let path = self.folder.path().join(format!("{stage}.sh"));
         let script = script.replace("{gyre}", crate::PROGRAM);
-        fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        install(&path, format!("#!/bin/sh\n{script}\n"));
         let command = format!("stages.{stage}.command=['{}']", path.display());
         self.set(&command)
     }

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::Child,
     thread,
     time::{Duration, Instant},
@@ -16,6 +16,12 @@ use super::{
     processes::{self, send},
     spawned::{LIMIT, LOOK, Spawned},
 };
+
+/// The poses in the journal of a run, its end among them.
+pub fn poses_of(out: &Path) -> usize {
+    let records = journal::records(&journal::path(out));
+    records.map_or(0, |records| records.into_iter().flatten().count())
+}
 
 /// A running command. Dropped before its end, it is killed.
 pub struct Running {
@@ -62,9 +68,10 @@ impl Running {
         })
     }
 
-    pub fn await_guardian(&mut self, not: Option<Pid>) -> Pid {
-        self.until("a guardian", |running| {
-            processes::child_with(running.pid(), "guard").filter(|pid| Some(*pid) != not)
+    /// Waits for a child other than `not` with this word in its command.
+    pub fn await_child(&mut self, word: &str, not: Option<Pid>) -> Pid {
+        self.until(word, |running| {
+            processes::child_with(running.pid(), word).filter(|pid| Some(*pid) != not)
         })
     }
 
@@ -84,8 +91,7 @@ impl Running {
     }
 
     pub fn poses(&self) -> usize {
-        let records = journal::records(&journal::path(self.run.out()));
-        records.map_or(0, |records| records.into_iter().flatten().count())
+        poses_of(self.run.out())
     }
 
     pub fn shared_memory_bytes(&self) -> u64 {

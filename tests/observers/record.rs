@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::{
     common::{
-        Ended, Run, Running, finished, odometry, processes, python,
+        Ended, Run, finished, odometry, python,
         recording::{SCANS, around_a_block},
         send, undisturbed, with_tmpfs,
     },
@@ -61,18 +61,6 @@ pub fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
     recording.entries(topic).map(|entry| entry.seq).collect()
 }
 
-/// Waits for a recorder of the run other than `not`.
-pub fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
-    loop {
-        let recorder = processes::child_with(running.pid(), "record");
-        if let Some(pid) = recorder.filter(|pid| Some(*pid) != not) {
-            return pid;
-        }
-        assert!(!running.is_over(), "the run ended without a recorder");
-        thread::sleep(Duration::from_millis(5));
-    }
-}
-
 #[test]
 fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
     let run = recorded(&played()).set(ALL);
@@ -103,9 +91,9 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
 fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() {
     let run = recorded(&played()).rate("1");
     let mut running = run.started(SCANS / 4);
-    let killed = await_recorder(&mut running, None);
+    let killed = running.await_child("record", None);
     send(killed, Signal::KILL);
-    await_recorder(&mut running, Some(killed));
+    running.await_child("record", Some(killed));
     running.finish().succeeded().says("started again");
     assert_eq!(run.odometry(), undisturbed());
     assert_eq!(parts(&file(&run)).len(), 2);
@@ -151,7 +139,7 @@ fn await_file(path: &Path) {
 fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     let run = recorded(&played()).set(ALL).rate("1").set("run.window=1");
     let mut running = run.started(SCANS / 4);
-    let recorder = await_recorder(&mut running, None);
+    let recorder = running.await_child("record", None);
     send(recorder, Signal::STOP);
     running.await_poses(SCANS - 4);
     send(recorder, Signal::CONT);
@@ -190,13 +178,13 @@ fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
 fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_counted() {
     let run = recorded(&played()).rate("1").set("run.window=1");
     let mut running = run.started(SCANS / 4);
-    let killed = await_recorder(&mut running, None);
+    let killed = running.await_child("record", None);
     // It writes nothing from here on, so that the gap is longer than the history of the topics,
     // however fast the machine is.
     send(killed, Signal::STOP);
     running.await_poses(SCANS - 8);
     send(killed, Signal::KILL);
-    await_recorder(&mut running, Some(killed));
+    running.await_child("record", Some(killed));
     let ended = running.finish();
     ended.succeeded();
     counted_as_missed(&run, &ended);
@@ -207,7 +195,7 @@ fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_count
 fn a_recorder_that_dies_right_before_the_end_is_reported() {
     let run = recorded(&played()).rate("1").set("record.topics=['scan']");
     let mut running = run.started(SCANS / 4);
-    let recorder = await_recorder(&mut running, None);
+    let recorder = running.await_child("record", None);
     send(recorder, Signal::STOP);
     running.await_poses(SCANS);
     send(recorder, Signal::KILL);

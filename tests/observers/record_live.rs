@@ -8,18 +8,17 @@ use gyre_journal as journal;
 use gyre_recording::{open_recording, parts};
 use rustix::process::Signal;
 
-use super::record::{WINDOW, await_recorder, file, recorded};
+use super::record::{ALL, WINDOW, file, recorded};
 use crate::common::{Run, recording, send};
 
 const SCANS: usize = 70;
-const TOPICS: &str = "record.topics=['scan','masked','rotation','motion','refined','pose']";
 
 /// A live run that is recorded, with a refinement that is slower than the scans: whenever masking
 /// is started again, scans that it had taken are in flight.
 fn played() -> Run {
     let run = Run::small().data(recording::around_a_block());
     let run = run.rate("2").set(&format!("source.scans={SCANS}"));
-    let run = run.set("run.mode=live").set(WINDOW).set(TOPICS);
+    let run = run.set("run.mode=live").set(WINDOW).set(ALL);
     recorded(&run.set("stages.refinement.delay_ms=180"))
 }
 
@@ -38,7 +37,7 @@ fn a_recording_has_all_results_of_a_run_that_was_stopped() {
         let run = Run::small().data(recording::around_a_block());
         // Scans are in flight all the time, so that poses follow the request to stop.
         let run = run.set(WINDOW).set("stages.refinement.delay_ms=15");
-        let run = recorded(&run.set(TOPICS).rate("max"));
+        let run = recorded(&run.set(ALL).rate("max"));
         let running = run.started(20);
         running.signal(Signal::INT);
         running.end();
@@ -57,7 +56,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
     let run = played().set("record.topics=['masked','motion']");
     let mut running = run.started(8);
     // It does nothing from here on, as if it came back only after the second kill.
-    let recorder = await_recorder(&mut running, None);
+    let recorder = running.await_child("record", None);
     send(recorder, Signal::STOP);
     let poses = running.poses();
     running.kill("masking");

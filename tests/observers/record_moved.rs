@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
 
-use super::record::{await_recorder, file, played, recorded, replay, seqs};
+use super::record::{file, played, recorded, replay, seqs};
 use crate::common::{finished, recording::SCANS, send, undisturbed};
 
 /// Moves all parts but the newest one; returns how many.
@@ -29,9 +29,9 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     let moved = move_away(&file(&run), &other_disk);
     assert!(moved > 0);
     // A new recorder continues without the first part.
-    let killed = await_recorder(&mut running, None);
+    let killed = running.await_child("record", None);
     send(killed, Signal::KILL);
-    await_recorder(&mut running, Some(killed));
+    running.await_child("record", Some(killed));
     running.await_poses(2 * SCANS / 3);
     let moved = moved + move_away(&file(&run), &other_disk);
     running.finish().succeeded();

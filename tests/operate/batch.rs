@@ -17,7 +17,7 @@ use rustix::process::{Pid, Signal, kill_process_group};
 pub(crate) use drives::Drives;
 
 use crate::common::{
-    Ended, assert_nothing_left, gyre, leftovers, processes, recording, send, with_tmpfs,
+    Ended, assert_nothing_left, gyre, leftovers, poses_of, processes, recording, send, with_tmpfs,
 };
 
 /// A batch takes seconds, far more only on a loaded machine.
@@ -96,8 +96,7 @@ impl Batch<'_> {
     }
 
     fn poses(&self, name: &str) -> usize {
-        let path = journal::path(&self.results(name));
-        journal::records(&path).map_or(0, |records| records.into_iter().flatten().count())
+        poses_of(&self.results(name))
     }
 
     pub fn table(&self) -> String {

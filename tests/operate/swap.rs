@@ -1,8 +1,6 @@
 //! Swaps: another program takes the place of a stage of a running run, or fails to.
 
 use std::{
-    fs,
-    os::unix::fs::PermissionsExt,
     process::{Child, Stdio},
     thread,
     time::{Duration, Instant},
@@ -13,7 +11,7 @@ use serde_json::Value;
 
 use crate::{
     PROGRAM,
-    common::{Ended, Run, STAGES, gyre, undisturbed},
+    common::{Ended, Run, STAGES, gyre, install, undisturbed},
     operate::commands::{ask, process, started, status},
     reach::conformance,
 };
@@ -98,8 +96,7 @@ fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
 /// An executable script.
 fn script(run: &Run, name: &str, text: &str) -> String {
     let path = run.folder().join(name);
-    fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
-    fs::set_permissions(&path, fs::Permissions::from_mode(0o700)).unwrap();
+    install(&path, format!("#!/bin/sh\n{text}\n"));
     path.to_str().unwrap().to_owned()
 }
 

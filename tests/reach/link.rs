@@ -14,9 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_journal as journal;
-
-use crate::common::{Ended, Run, finished, gyre, recording, undisturbed, wrapped};
+use crate::common::{Ended, Run, finished, gyre, poses_of, recording, undisturbed, wrapped};
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// Time for which the link is cut: longer than the time after which a connection is given up.
@@ -155,7 +153,7 @@ fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
     let (received_part, _) = received.stderr.split_once("; missed").unwrap();
     assert!(received_part.contains(" scan"), "{}", received.stderr);
     sending.join().unwrap().succeeded();
-    assert_eq!(poses(&seen) + 1, poses(run.out()), "all but the end");
+    assert_eq!(poses_of(&seen) + 1, poses_of(run.out()), "all but the end");
 }
 
 #[test]
@@ -266,13 +264,9 @@ fn end(process: &mut Child) {
     process.wait().unwrap();
 }
 
-fn poses(out: &Path) -> usize {
-    journal::records(&journal::path(out)).map_or(0, |records| records.into_iter().flatten().count())
-}
-
 fn await_poses(out: &Path) {
     let since = Instant::now();
-    while poses(out) < 2 {
+    while poses_of(out) < 2 {
         assert!(since.elapsed() < MAX_WAIT, "waited in vain for poses");
         thread::sleep(Duration::from_millis(20));
     }

@@ -26,9 +26,9 @@ fn what_a_stage_has_started_ends_with_a_killed_supervisor() {
 fn a_killed_guardian_is_replaced_and_knows_all_stages() {
     let run = Run::of_recording().rate("2").stage_script("masking", SHELL);
     let mut running = run.start();
-    let guardian = running.await_poses(2).await_guardian(None);
+    let guardian = running.await_poses(2).await_child("guard", None);
     send(guardian, Signal::KILL);
-    running.await_guardian(Some(guardian));
+    running.await_child("guard", Some(guardian));
     running.kill_supervisor();
     leftovers::assert_nothing_left(run.out());
 }
