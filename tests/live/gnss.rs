@@ -7,8 +7,6 @@ use std::{
     time::Duration,
 };
 
-use gyre_contract::FollowerId;
-use rustix::process::Signal;
 use tempfile::TempDir;
 
 use super::{
@@ -19,7 +17,6 @@ use crate::{
     common::{
         Run,
         recording::{self, around_a_block},
-        send,
     },
     observers::record::{self, recorded},
     slam::gnss::{left, log, with_antenna},
@@ -118,32 +115,6 @@ pub fn assert_replays(run: &Run) {
 
 fn replayed(run: &Run) -> Run {
     record::replayed(&record::file(run), &[]).0
-}
-
-#[test]
-#[ignore = ".ci/nightly: another live run"]
-fn a_trajectory_that_is_killed_goes_on_with_its_log() {
-    let drive = drive();
-    let address = address(5);
-    let radar = Radar::playing(drive.path(), &[]);
-    let run = recorded(&receiving(&radar, &address, SCANS));
-    let mut running = run.start();
-    let receiver = sending(&run, address.clone());
-    running.await_poses_or_end(10);
-    let trajectory = running.stages()[FollowerId::Trajectory.name()];
-    send(trajectory, Signal::KILL);
-    running.await_poses_or_end(20);
-    // By now the process has been restarted.
-    let more = UdpSocket::bind("127.0.0.1:0").unwrap();
-    more.send_to(b"hello", &address).unwrap();
-    running.finish().succeeded();
-    receiver.join().unwrap();
-    let gnss = run.summary()["gnss"].clone();
-    assert!(gnss["fixes"].as_u64().unwrap() > 20, "{gnss}");
-    let text = std::fs::read_to_string(received(&run)).unwrap();
-    assert_eq!(text.matches("stamp_ns").count(), 1, "{text}");
-    assert!(text.ends_with("unreadable\n"), "{text}");
-    assert_replays(&run);
 }
 
 #[test]
