@@ -10,7 +10,6 @@ use std::{
 };
 
 use gyre_client::{Usage, control::Control, memory};
-
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;

@@ -263,7 +263,6 @@ fn a_second_run_with_the_same_results_is_refused_whatever_it_calls_them() {
     symlink(run.out(), &link).unwrap();
     fs::create_dir(&mounted).unwrap();
     let named = |out: &Path| run.clone().into(out).command();
-
     let mut seconds = vec![
         run.command(),
         named(&link),

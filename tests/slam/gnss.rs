@@ -6,9 +6,7 @@ use std::{fs, path::PathBuf};
 use gyre_datasets::read_trajectory;
 use gyre_geometry::samples::{Geographic, LocalPlane};
 use gyre_radar::Trajectory;
-
 use gyre_slam::mapping::{Map, Origin};
-
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::Value;
 

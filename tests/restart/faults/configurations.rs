@@ -9,7 +9,6 @@ use std::{
 };
 
 use gyre_contract::FollowerId;
-
 use serde_json::Value;
 
 use crate::{
