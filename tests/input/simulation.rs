@@ -45,7 +45,8 @@ fn a_stored_run_keeps_its_recording_and_gives_the_same_motions() {
 fn a_part_of_a_simulation_is_the_same_part_of_its_recording() {
     let recording = tempfile::tempdir().unwrap();
     let words = "simulate --scans 12 --seed 3 --threads 1 \
-        --set simulation.sensor.profile=cts350x-radiate --set simulation.output.format=oxford --out";
+        --set simulation.sensor.profile=cts350x-radiate \
+        --set simulation.output.format=oxford --out";
     finished![; words.split_whitespace(); [recording.path()]].succeeded();
     let part = |run: Run| run.set("source.first=4").set("source.scans=5").complete();
     assert_eq!(part(streamed()), part(streamed().data(recording.path())));

@@ -21,7 +21,8 @@ use crate::{
     reach::only_if,
 };
 
-/// The recording's six seconds in twenty: time for commands, also while other tests keep the machine busy.
+/// The recording's six seconds in twenty: time for commands, also while other tests keep the
+/// machine busy.
 const SLOW: &str = "0.3";
 
 /// A command about a run.
