@@ -10,6 +10,8 @@ use std::{
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use super::can;
+
 /// A page becomes as it should within seconds, later only on a loaded machine.
 const LIMIT: Duration = Duration::from_secs(60);
 const LOOK: Duration = Duration::from_millis(100);
@@ -30,14 +32,7 @@ pub struct Browser {
 impl Browser {
     /// Starts a browser; prints why a test is skipped if there is no browser.
     pub fn start() -> Option<Self> {
-        let works = |program: &&&str| {
-            let version = Command::new(program).arg("--version").output();
-            version.is_ok_and(|output| output.status.success())
-        };
-        let Some(program) = PROGRAMS.iter().find(works) else {
-            println!("skipped: Chromium is not installed");
-            return None;
-        };
+        let program = PROGRAMS.into_iter().find(|it| can(&[it, "--version"]))?;
         let profile = tempfile::tempdir().unwrap();
         // The browser reads its requests at descriptor 3, and answers at 4. Its sandbox does not
         // work as root, and it opens our page alone.

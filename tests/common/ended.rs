@@ -58,12 +58,23 @@ impl Ended {
         self
     }
 
-    pub fn says(&self, words: &str) {
-        assert!(self.stderr.contains(words), "{}", self.stderr);
+    /// Asserts that these words are in its messages.
+    pub fn says(&self, words: &str) -> &Self {
+        let said = &self.stderr;
+        assert!(said.contains(words), "`{words}` is not in: {said}");
+        self
     }
 
-    pub fn does_not_say(&self, words: &str) {
+    pub fn does_not_say(&self, words: &str) -> &Self {
         assert!(!self.stderr.contains(words), "{}", self.stderr);
+        self
+    }
+
+    /// Asserts that these words are in its output.
+    pub fn prints(&self, words: &str) -> &Self {
+        let printed = &self.stdout;
+        assert!(printed.contains(words), "`{words}` is not in: {printed}");
+        self
     }
 
     fn assert_calm(&self) {

@@ -3,7 +3,7 @@
 //! left nothing behind.
 
 // Each test binary uses its own part of this.
-#![allow(dead_code, unused_imports, clippy::unwrap_used)]
+#![allow(dead_code, unused_imports, unused_macros, clippy::unwrap_used)]
 
 mod browser;
 mod ended;
@@ -36,9 +36,10 @@ pub use ended::Ended;
 pub use leftovers::{assert_nothing_left, assert_nothing_left_of};
 pub use other_user::OtherUser;
 pub use processes::{Pid, cpu_time, send};
-pub use running::Running;
+pub use running::{Running, poses_of};
 pub use server::Server;
 pub use shared::Shared;
+pub use spawned::Spawned;
 pub use watch::{Watch, Watched};
 
 /// The stages of a run that does not search jointly, in the order of the stream.
@@ -73,6 +74,34 @@ pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)
 }
 
+/// Runs `gyre` with these words, each a text or a path, to its end. Lists of words come behind `;`.
+macro_rules! finished {
+    ($($word:expr),* $(; $words:expr)*) => {{
+        let mut command = $crate::common::gyre();
+        $(command.arg($word);)*
+        $(command.args($words);)*
+        $crate::common::Ended::of(command)
+    }};
+}
+pub(crate) use finished;
+
+/// Returns whether a command works here; prints why a test is skipped.
+pub fn can(command: &[&str]) -> bool {
+    let output = Command::new(command[0]).args(&command[1..]).output();
+    let can = output.is_ok_and(|output| output.status.success());
+    if !can {
+        println!("skips what needs `{}`", command.join(" "));
+    }
+    can
+}
+
+/// Returns whether this user can mount; prints why a test is skipped.
+pub fn can_mount() -> bool {
+    can(&[
+        "unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt",
+    ])
+}
+
 /// Makes a program of this content.
 ///
 /// A process of its own writes it. If this one had it open for writing, a process that another test
@@ -103,6 +132,19 @@ pub fn wrapped(by: &[&str], command: &Command) -> Command {
         .arg(command.get_program())
         .args(command.get_args());
     wrapped
+}
+
+/// The command with a mount of its own; `None` where the system does not permit that.
+pub fn with_mount(mount: &str, command: &Command) -> Option<Command> {
+    let script = format!("mount {mount} && exec \"$@\"");
+    let unshare = ["unshare", "--mount", "sh", "-c", &script, "sh"];
+    can_mount().then(|| wrapped(&unshare, command))
+}
+
+/// The command with a file system of its own at `place`; `None` as above.
+pub fn with_tmpfs(command: &Command, place: &Path, options: &str) -> Option<Command> {
+    let place = place.display();
+    with_mount(&format!("-t tmpfs -o {options} tmpfs '{place}'"), command)
 }
 
 /// A folder of real data; prints why and returns `None` if the folder is missing.
@@ -223,11 +265,9 @@ impl Run {
     /// The same with an executable shell script for a stage; `{gyre}` in it stands for the program
     /// under test.
     pub fn stage_script(self, stage: &str, script: &str) -> Self {
-        use std::os::unix::fs::PermissionsExt;
         let path = self.folder.path().join(format!("{stage}.sh"));
         let script = script.replace("{gyre}", crate::PROGRAM);
-        fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        install(&path, format!("#!/bin/sh\n{script}\n"));
         let command = format!("stages.{stage}.command=['{}']", path.display());
         self.set(&command)
     }
@@ -251,28 +291,15 @@ impl Run {
         command
     }
 
-    /// The command line with a file system of its own at `place`; `None` where the system does not
-    /// permit that.
-    pub fn with_tmpfs(&self, place: &Path, options: &str) -> Option<Command> {
-        let unshare = |script: &str| {
-            let mut command = Command::new("unshare");
-            let mount = format!("mount -t tmpfs -o {options} tmpfs \"$0\" && {script}");
-            command.args(["--mount", "sh", "-c", &mount]).arg(place);
-            command
-        };
-        let permitted = unshare("true").output();
-        if !permitted.is_ok_and(|output| output.status.success()) {
-            println!("skipped: a mount namespace of its own is not permitted here");
-            return None;
-        }
-        let own = self.command();
-        let mut command = unshare("exec \"$@\"");
-        command.arg(own.get_program()).args(own.get_args());
-        Some(command)
-    }
-
     pub fn start(&self) -> Running {
         self.start_as(self.command())
+    }
+
+    /// Starts it, and waits for so many poses.
+    pub fn started(&self, poses: usize) -> Running {
+        let mut running = self.start();
+        running.await_poses(poses);
+        running
     }
 
     /// Starts it by another command that becomes it, a shell's `exec` for instance.
@@ -293,11 +320,7 @@ impl Run {
 
     /// Starts it at a rate, and interrupts it after so many poses.
     pub fn interrupt(&self, rate: &str, poses: usize) {
-        let mut running = self.clone().rate(rate).start();
-        running
-            .await_poses(poses)
-            .signal(rustix::process::Signal::INT);
-        assert_eq!(running.finish().code(), Some(130));
+        self.clone().rate(rate).started(poses).interrupt();
     }
 
     /// Starts it, waits until it ends well, and returns its `odometry.csv`.

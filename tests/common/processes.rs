@@ -71,7 +71,7 @@ fn pids() -> impl Iterator<Item = Pid> {
 }
 
 /// The fields of a process behind its name: state, parent and others.
-fn stat(pid: Pid) -> Option<Vec<String>> {
+pub fn stat(pid: Pid) -> Option<Vec<String>> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     let (_, fields) = stat.rsplit_once(") ")?;
     Some(fields.split(' ').map(str::to_owned).collect())

@@ -10,16 +10,23 @@ use std::{
     sync::OnceLock,
 };
 
-use gyre_simulator::{OutputFormat, Profile, SimulationConfig, drive::DriveConfig, write_dataset};
+use gyre_simulator::{SimulationConfig, write_dataset};
 use tempfile::TempDir;
 
 use super::Run;
 
 pub const SCANS: usize = 24;
+/// A rate at which the small recording's six seconds take one: slow enough to disturb the middle.
+pub const MODERATE: &str = "6";
+pub const MIDDLE: usize = SCANS / 3;
 
 /// The radar of the small recordings in a section `[simulation]`. It has a sixth of the default
 /// one's bins: what happens between processes does not depend on them.
 pub const SENSOR: &str = "sensor.profile = 'cts350x-radiate'\noutput.format = 'oxford'\n";
+
+/// A drive whose recording has the form of RADIATE.
+pub const RADIATE: &str = "scans = 24\nsensor.profile = 'cts350x-radiate'\n\
+    output.format = 'radiate'\ndrive.speed_mps = 5.0\n";
 
 pub fn small() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
@@ -52,21 +59,17 @@ pub fn demo() -> &'static Path {
 
 /// The recording of a drive with this section `[simulation]`.
 pub fn configured(name: &str, settings: &str) -> PathBuf {
-    of(name, &toml::from_str(settings).unwrap())
+    let config: SimulationConfig = toml::from_str(settings).unwrap();
+    prepared(name, |recording| {
+        write_dataset(&config, recording, None, &mut |_, _| ()).unwrap();
+    })
 }
 
 /// The recording of a drive along a trajectory in the format TUM.
 pub fn along(name: &str, trajectory: &str) -> PathBuf {
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(&file, trajectory).unwrap();
-    let config = SimulationConfig {
-        drive: DriveConfig {
-            file: Some(file.path().to_owned()),
-            ..DriveConfig::default()
-        },
-        ..SimulationConfig::default()
-    };
-    of(name, &config)
+    configured(name, &format!("drive.file = '{}'", file.path().display()))
 }
 
 fn of_a_block(scans: usize) -> PathBuf {
@@ -75,15 +78,8 @@ fn of_a_block(scans: usize) -> PathBuf {
 
 /// A recording as RADIATE has them, whose host loses azimuths or not.
 pub fn of_radiate(loses_azimuths: bool) -> PathBuf {
-    let mut config = SimulationConfig {
-        scans: Some(SCANS),
-        ..SimulationConfig::default()
-    };
-    config.sensor.profile = Profile::Cts350xRadiate;
-    config.output.format = Some(OutputFormat::Radiate);
-    config.drive.speed_mps = 5.0;
-    config.sensor.lost_azimuths = loses_azimuths;
-    of(&format!("radiate-{loses_azimuths}"), &config)
+    let settings = format!("{RADIATE}sensor.lost_azimuths = {loses_azimuths}\n");
+    configured(&format!("radiate-{loses_azimuths}"), &settings)
 }
 
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links:
@@ -165,11 +161,6 @@ pub fn truncate(image: &Path, bytes: usize) {
     replace(image, &whole[..bytes.min(whole.len())]);
 }
 
-pub fn resize(image: &Path, width: u32, height: u32) {
-    let black = vec![0; (width * height) as usize];
-    replace(image, &encoded(width, height, &black));
-}
-
 fn encoded(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
@@ -222,12 +213,6 @@ pub fn shift(image: &Path, by_us: i64) {
 fn replace(image: &Path, bytes: &[u8]) {
     fs::remove_file(image).unwrap();
     fs::write(image, bytes).unwrap();
-}
-
-pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
-    prepared(name, |recording| {
-        write_dataset(config, recording, None, &mut |_, _| ()).unwrap();
-    })
 }
 
 /// Makes a recording in a new folder where the build keeps its temporary files, unless this build

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::Child,
     thread,
     time::{Duration, Instant},
@@ -16,6 +16,12 @@ use super::{
     processes::{self, send},
     spawned::{LIMIT, LOOK, Spawned},
 };
+
+/// The poses in the journal of a run, its end among them.
+pub fn poses_of(out: &Path) -> usize {
+    let records = journal::records(&journal::path(out));
+    records.map_or(0, |records| records.into_iter().flatten().count())
+}
 
 /// A running command. Dropped before its end, it is killed.
 pub struct Running {
@@ -62,9 +68,10 @@ impl Running {
         })
     }
 
-    pub fn await_guardian(&mut self, not: Option<Pid>) -> Pid {
-        self.until("a guardian", |running| {
-            processes::child_with(running.pid(), "guard").filter(|pid| Some(*pid) != not)
+    /// Waits for a child other than `not` with this word in its command.
+    pub fn await_child(&mut self, word: &str, not: Option<Pid>) -> Pid {
+        self.until(word, |running| {
+            processes::child_with(running.pid(), word).filter(|pid| Some(*pid) != not)
         })
     }
 
@@ -84,8 +91,7 @@ impl Running {
     }
 
     pub fn poses(&self) -> usize {
-        let records = journal::records(&journal::path(self.run.out()));
-        records.map_or(0, |records| records.into_iter().flatten().count())
+        poses_of(self.run.out())
     }
 
     pub fn shared_memory_bytes(&self) -> u64 {
@@ -116,16 +122,26 @@ impl Running {
         self.stages().into_values().find_map(processes::run_of)
     }
 
-    /// The entry in the environment of each of its stages.
-    pub fn mark(&self) -> String {
-        format!("GYRE_RUN={}", leftovers::root(self.run.out()).display())
-    }
-
     /// Waits until the run ends, and asserts that it leaves nothing behind.
     pub fn finish(self) -> Ended {
         let out = self.run.out().to_owned();
         let ended = self.end();
         leftovers::assert_nothing_left(&out);
+        ended
+    }
+
+    /// Waits until the run ends well, and returns its `odometry.csv`.
+    pub fn complete(self) -> String {
+        let run = self.run.clone();
+        self.finish().succeeded();
+        run.odometry()
+    }
+
+    /// Ends the run as Ctrl-C does.
+    pub fn interrupt(self) -> Ended {
+        self.signal(Signal::INT);
+        let ended = self.finish();
+        assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
         ended
     }
 

@@ -7,12 +7,14 @@ use std::{
 };
 
 use crate::{
-    common::{Run, odometry, recording, runtime_is_installed},
+    common::{
+        Run, odometry,
+        recording::{self, MODERATE},
+        runtime_is_installed,
+    },
     method::{in_process::assert_same_bits, learned_masks::card},
 };
 
-/// The recording's six seconds in one.
-const MODERATE: &str = "6";
 /// The scan before which time breaks.
 pub const BREAK: usize = 12;
 const HOUR_US: i64 = 3_600_000_000;

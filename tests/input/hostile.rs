@@ -10,7 +10,6 @@ use std::{
 
 use gyre_journal as journal;
 use gyre_slam::{Keyframe, Place, Query, records_path};
-use tempfile::TempDir;
 
 use crate::common::{Ended, Run, recording, undisturbed, wrapped};
 
@@ -38,17 +37,6 @@ fn sparse(file: &Path) {
     File::create(file).unwrap().set_len(100 << 30).unwrap();
 }
 
-fn recording_of_vast_images() -> TempDir {
-    let recording = recording::copy(2);
-    for image in recording::images(recording.path()) {
-        let mut bytes = fs::read(&image).unwrap();
-        fs::remove_file(&image).unwrap();
-        bytes[16..20].copy_from_slice(&(1_u32 << 31).to_be_bytes());
-        fs::write(&image, bytes).unwrap();
-    }
-    recording
-}
-
 /// Files are opened by one reader, which has tests of its own; here, each command reads by it.
 #[test]
 fn files_without_end_are_refused_whatever_reads_them() {
@@ -67,7 +55,7 @@ fn files_without_end_are_refused_whatever_reads_them() {
     symlink("/dev/zero", &settings).unwrap();
     let simulated = tempfile::tempdir().unwrap();
     symlink("/dev/zero", simulated.path().join("simulation.toml")).unwrap();
-    let images = recording_of_vast_images();
+
     let models = Path::new(crate::PROJECT).join("shared/method/masking/tests/models");
     let card = file("single-127.toml");
     fs::copy(models.join("single-127.toml"), &card).unwrap();
@@ -90,7 +78,6 @@ fn files_without_end_are_refused_whatever_reads_them() {
         ("run\n/dev/zero".to_owned(), ["/dev/zero", "it is a device"]),
         (format!("run\n{}", path(&run)), ["run.toml", "16 MB"]),
         (inspect(endless.path()), ["dataset.toml", "a device"]),
-        (inspect(images.path()), ["png", "too large"]),
         (simulate, ["simulation.toml", "a device"]),
         (format!("{evaluate}\n{}", path(&truth)), ["truth.tum", ""]),
         (format!("{evaluate}\n{motions}"), ["odometry.csv", "line"]),
@@ -130,8 +117,7 @@ fn a_pipe_in_place_of_a_file_is_refused_at_once() {
     }
     for data in [options.path(), &recorded] {
         let out = folder.path().join("out");
-        let ended = at_once(&["run", path(data), "--out", path(&out)]);
-        ended.refused_with(&[is_pipe]);
+        at_once(&["run", path(data), "--out", path(&out)]).refused_with(&[is_pipe]);
     }
 }
 
@@ -144,8 +130,7 @@ fn replace_by_pipe(file: &Path) {
 #[test]
 fn a_journal_and_logs_of_impossible_lengths_are_refused_and_a_mended_run_goes_on() {
     let run = Run::of_recording().rate("6").set("slam.kind=graph");
-    let mut running = run.start();
-    running.await_poses(recording::SCANS / 2);
+    let running = run.started(recording::SCANS / 2);
     running.kill_supervisor();
     let out = run.out();
     for log in [

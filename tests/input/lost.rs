@@ -3,26 +3,19 @@
 
 use std::{fs, path::Path, thread, time::Duration};
 
-use crate::common::{Run, Running, recording, send, undisturbed};
+use crate::common::{
+    Run,
+    recording::{self, MIDDLE, MODERATE},
+    send, undisturbed,
+};
 use rustix::process::Signal;
 use tempfile::TempDir;
-
-/// The recording's six seconds in one.
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
 
 /// A whole recording, and a run of it at a rate.
 fn whole(rate: &str) -> (TempDir, Run) {
     let recording = recording::copy(recording::SCANS);
     let run = Run::of_recording_named(recording.path().to_str().unwrap());
     (recording, run.rate(rate))
-}
-
-/// Starts a run, and waits for its middle.
-fn started(run: &Run) -> Running {
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
-    running
 }
 
 /// Moves the folder of images away.
@@ -69,7 +62,7 @@ fn a_folder_that_is_away_for_a_moment_loses_nothing_whatever_restarts_meanwhile(
 fn a_source_that_waits_for_its_input_has_not_stalled() {
     let (recording, run) = whole(MODERATE);
     let run = run.set("run.stall_timeout_s=2");
-    let running = started(&run);
+    let running = run.started(MIDDLE);
     take_away(recording.path());
     thread::sleep(Duration::from_secs(4));
     bring_back(recording.path());
@@ -83,7 +76,7 @@ fn a_source_that_waits_for_its_input_has_not_stalled() {
 fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
     let (recording, run) = whole(MODERATE);
     let run = run.set("source.retry_s=0.3");
-    let running = started(&run);
+    let running = run.started(MIDDLE);
     take_away(recording.path());
     running.finish().failed_with(&[
         "radar-replay: cannot read",
@@ -101,13 +94,13 @@ fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
 #[test]
 fn a_run_that_waits_for_its_input_can_be_interrupted() {
     let (recording, run) = whole(MODERATE);
+    // A time longer than any run is no limit.
     let run = run.set("source.retry_s=1e300");
-    let running = started(&run);
+    let run = run.set("run.stall_timeout_s=1e300");
+    let running = run.started(MIDDLE);
     take_away(recording.path());
     thread::sleep(Duration::from_millis(300));
-    running.signal(Signal::INT);
-    let ended = running.finish();
-    assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+    running.interrupt();
     bring_back(recording.path());
     run.complete();
     assert_whole(&run);
@@ -117,7 +110,7 @@ fn a_run_that_waits_for_its_input_can_be_interrupted() {
 fn a_live_run_whose_folder_is_away_for_a_moment_accounts_for_every_scan() {
     let (recording, run) = whole("4");
     let run = run.set("run.mode=live");
-    let running = started(&run);
+    let running = run.started(MIDDLE);
     take_away(recording.path());
     thread::sleep(Duration::from_millis(600));
     bring_back(recording.path());
@@ -134,7 +127,7 @@ fn a_live_run_whose_folder_is_away_for_a_moment_accounts_for_every_scan() {
 #[test]
 fn a_source_restarted_after_files_came_and_went_plays_the_same_scans() {
     let (recording, run) = whole(MODERATE);
-    let mut running = started(&run);
+    let mut running = run.started(MIDDLE);
     let images = recording::images(recording.path());
     fs::copy(&images[0], recording.path().join("radar/1.png")).unwrap();
     for image in &images[1..4] {
@@ -179,8 +172,7 @@ fn a_recording_with_many_damaged_scans_gives_results_but_no_success() {
     let (_recording, run) = damaged((1..recording::SCANS).step_by(3));
     let ended = run.finish();
     ended.failed_with(&["8 of the 24 scans", "cannot be read", "log.jsonl"]);
-    let said = &ended.stdout;
-    assert!(said.contains("complete but for unreadable scans"), "{said}");
+    ended.prints("complete but for unreadable scans");
     assert_eq!(run.summary()["processed"], 16);
 }
 

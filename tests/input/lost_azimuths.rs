@@ -8,7 +8,7 @@ use gyre_geometry::{OwnedScan, scan::flag};
 use gyre_radar::lost::stale_rows;
 use serde_json::json;
 
-use crate::common::{Ended, Run, gyre, recording};
+use crate::common::{Ended, Run, finished, recording};
 
 /// The scans of a recording of RADIATE.
 fn scans(recording: &Path) -> Vec<OwnedScan> {
@@ -61,9 +61,7 @@ fn misplaced(scans: &[OwnedScan], whole: &[OwnedScan], stale: &[usize]) -> f64 {
 const AS_IMAGES: [&str; 2] = ["--format=radiate", "--out"];
 
 fn export(from: &Path, options: &[&str], to: &Path) -> Ended {
-    let mut command = gyre();
-    command.arg("export").arg(from).args(options).arg(to);
-    Ended::of(command)
+    finished!["export", from; options; [to]]
 }
 
 #[test]
@@ -83,7 +81,7 @@ fn lost_azimuths_are_counted_and_put_back_in_an_export() {
     let said = export(run.out(), &AS_IMAGES, &out);
     said.succeeded();
     let sentence = format!("{repaired} of them repaired, which had lost {lost} azimuths");
-    assert!(said.stdout.contains(&sentence), "{}", said.stdout);
+    said.prints(&sentence);
     let after = scans(&out);
     assert_eq!(after.len(), before.len());
     assert_eq!(stale(&after), vec![0; after.len()]);
@@ -104,14 +102,12 @@ fn lost_azimuths_are_counted_and_put_back_in_an_export() {
         ..stored_options(&lossy).unwrap()
     };
     assert_eq!(stored_options(&out).unwrap(), expected);
-    let again = export(run.out(), &AS_IMAGES, &out);
-    again.failed_with(&["repaired exists: name a new folder"]);
+    export(run.out(), &AS_IMAGES, &out).failed_with(&["repaired exists: name a new folder"]);
 
     let bag = run.folder().join("bag.mcap");
     let ended = export(run.out(), &["--mcap"], &bag);
-    let said = &ended.succeeded().stderr;
     let sentence = format!("{repaired} scans have lost azimuths: their rows are at the angles");
-    assert!(said.contains(&sentence), "{said}");
+    ended.succeeded().says(&sentence);
     let mut dataset = gyre_recording::open(&bag, &DatasetOptions::default()).unwrap();
     let misplaced = |scans: &[OwnedScan]| misplaced(scans, &true_scans, &stale_before);
     let (wrong, right) = (misplaced(&before), misplaced(&read_all(dataset.as_mut())));
@@ -125,12 +121,12 @@ fn only_runs_that_have_looked_for_lost_azimuths_are_exported_in_radiate_s_form()
     ignoring.complete();
     assert!(ignoring.summary().get("lost").is_none());
     let out = ignoring.folder().join("repaired");
-    let ended = export(ignoring.out(), &AS_IMAGES, &out);
-    ended.failed_with(&["the run has not looked for lost azimuths"]);
+    export(ignoring.out(), &AS_IMAGES, &out)
+        .failed_with(&["the run has not looked for lost azimuths"]);
     let other = Run::of_recording();
     other.complete();
     export(other.out(), &AS_IMAGES, &out).failed_with(&["are of the format `oxford`"]);
-    let ended = export(&recording::of_radiate(true), &AS_IMAGES, &out);
-    ended.failed_with(&["name the folder of its results"]);
+    export(&recording::of_radiate(true), &AS_IMAGES, &out)
+        .failed_with(&["name the folder of its results"]);
     assert!(!out.exists());
 }

@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::common::{Ended, OtherUser, folder, gyre, recording};
+use crate::common::{Ended, OtherUser, finished, folder, recording};
 
 /// A name with a byte that no UTF-8 has.
 fn unprintable(folder: &Path) -> PathBuf {
@@ -18,10 +18,7 @@ fn unprintable(folder: &Path) -> PathBuf {
 }
 
 fn run_of(data: impl AsRef<OsStr>, out: impl AsRef<OsStr>) -> Ended {
-    let mut command = gyre();
-    command.arg("run").arg(data);
-    command.arg("--out").arg(out);
-    Ended::of(command)
+    finished!["run", data, "--out", out]
 }
 
 #[test]
@@ -34,27 +31,19 @@ fn a_recording_or_results_whose_name_is_not_utf_8_are_refused_as_that() {
     run_of(&named, &out).refused_with(&sentence);
     let mut bare = OsString::from(&named);
     bare.push("-results");
-    let refused = run_of(recording::small(), &bare);
-    refused.failed_with(&["dr\\xFFive-results\" has a name that is not UTF-8"]);
+    run_of(recording::small(), &bare)
+        .failed_with(&["dr\\xFFive-results\" has a name that is not UTF-8"]);
     assert!(!out.exists() && !Path::new(&bare).exists());
     // A configuration is only read.
     let configuration = named.with_extension("toml");
     fs::write(&configuration, "[raster]\nn = 127\ncell_m = 0.8\n").unwrap();
-    let mut command = gyre();
-    command.arg("run").arg(configuration);
-    command.arg(recording::small()).arg("--out").arg(&out);
-    Ended::of(command).succeeded();
+    finished!["run", configuration, recording::small(), "--out", &out].succeeded();
 }
 
 #[test]
 fn a_folder_in_place_of_a_configuration_is_refused_with_what_to_name() {
     let folder = folder();
-    let run = |named: &Path| {
-        let mut command = gyre();
-        command.arg("simulate").arg(named);
-        command.arg("--out").arg(folder.path().join("drive"));
-        Ended::of(command)
-    };
+    let run = |named: &Path| finished!["simulate", named, "--out", folder.path().join("drive")];
     run(recording::small()).refused_with(&["the configuration ", " is a folder: name a TOML file"]);
     fs::write(folder.path().join("config.toml"), "").unwrap();
     let own = folder.path().join("config.toml");

@@ -6,7 +6,7 @@ use std::{fs, path::Path};
 use gyre_transport::run::SHARED_MEMORY;
 
 use crate::{
-    common::{Ended, Run, STAGES, odometry, recording},
+    common::{Ended, Run, STAGES, odometry, recording, with_tmpfs},
     restart::faults::configurations,
 };
 
@@ -112,26 +112,9 @@ fn a_scan_that_cannot_be_used_is_skipped_wherever_it_is() {
         let truncate = |image: &Path| recording::truncate(image, 100_000);
         skips(bad, "truncated", truncate);
     }
-    // An image of another size.
-    skips(4, "most images of the dataset are", |image| {
-        recording::resize(image, 1000, 400)
-    });
-    // A row that is a year ahead.
-    skips(4, "row 200: stamp is 31536000", |image| {
-        recording::restamp(image, |row, us| match row {
-            200 => us + 31_536_000_000_000,
-            _ => us,
-        })
-    });
 }
 
 // The machine.
-
-#[test]
-fn a_time_longer_than_any_run_is_no_limit() {
-    let run = Run::of_recording().set("run.stall_timeout_s=1e300");
-    run.finish().succeeded();
-}
 
 #[test]
 fn a_stage_command_that_does_not_exist_is_reported() {
@@ -162,7 +145,7 @@ fn an_unknown_stage_and_a_stage_without_a_run_are_reported() {
 #[test]
 fn too_little_shared_memory_is_reported_with_the_need_and_just_enough_suffices() {
     let run = Run::of_recording();
-    let with = |options: &str| run.with_tmpfs(Path::new(SHARED_MEMORY), options);
+    let with = |options: &str| with_tmpfs(&run.command(), Path::new(SHARED_MEMORY), options);
     let Some(small) = with("size=1m") else {
         return;
     };

@@ -7,8 +7,6 @@ use std::{
     time::Duration,
 };
 
-use gyre_contract::FollowerId;
-use rustix::process::Signal;
 use tempfile::TempDir;
 
 use super::{
@@ -19,7 +17,6 @@ use crate::{
     common::{
         Run,
         recording::{self, around_a_block},
-        send,
     },
     observers::record::{self, recorded},
     slam::gnss::{left, log, with_antenna},
@@ -48,7 +45,7 @@ pub fn with_graph(run: Run, address: &str) -> Run {
 
 /// The messages that the receiver sends during the drive.
 pub fn log_of_drive() -> String {
-    let text = log(0.0);
+    let text = log();
     let lines = text.lines().take(1 + FIXES);
     lines.map(|line| format!("{line}\n")).collect()
 }
@@ -121,32 +118,6 @@ fn replayed(run: &Run) -> Run {
 }
 
 #[test]
-#[ignore = ".ci/nightly: another live run"]
-fn a_trajectory_that_is_killed_goes_on_with_its_log() {
-    let drive = drive();
-    let address = address(5);
-    let radar = Radar::playing(drive.path(), &[]);
-    let run = recorded(&receiving(&radar, &address, SCANS));
-    let mut running = run.start();
-    let receiver = sending(&run, address.clone());
-    running.await_poses_or_end(10);
-    let trajectory = running.stages()[FollowerId::Trajectory.name()];
-    send(trajectory, Signal::KILL);
-    running.await_poses_or_end(20);
-    // By now the process has been restarted.
-    let more = UdpSocket::bind("127.0.0.1:0").unwrap();
-    more.send_to(b"hello", &address).unwrap();
-    running.finish().succeeded();
-    receiver.join().unwrap();
-    let gnss = run.summary()["gnss"].clone();
-    assert!(gnss["fixes"].as_u64().unwrap() > 20, "{gnss}");
-    let text = std::fs::read_to_string(received(&run)).unwrap();
-    assert_eq!(text.matches("stamp_ns").count(), 1, "{text}");
-    assert!(text.ends_with("unreadable\n"), "{text}");
-    assert_replays(&run);
-}
-
-#[test]
 fn a_live_receiver_that_is_silent_leaves_slam_to_the_radar_and_that_is_said() {
     let radar = Radar::playing(recording::small(), &[]);
     let run = recorded(&receiving(&radar, &address(4), 12));
@@ -156,13 +127,4 @@ fn a_live_receiver_that_is_silent_leaves_slam_to_the_radar_and_that_is_said() {
     let trajectory = |run: &Run| run.result("trajectory_slam.tum");
     assert!(trajectory(&run).lines().count() >= 11);
     assert_eq!(trajectory(&replayed(&run)), trajectory(&run));
-}
-
-#[test]
-fn fixes_that_cannot_arrive_are_refused_before_the_run() {
-    let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap().to_string();
-    let radar = Radar::playing(recording::small(), &[]);
-    let run = receiving(&radar, &address, 4);
-    run.finish().refused_with(&[&address, "gnss.listen"]);
 }

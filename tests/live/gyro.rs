@@ -9,7 +9,6 @@ use std::{
     time::Duration,
 };
 
-use gyre_simulator::{GyroProfile, SimulationConfig};
 use tempfile::TempDir;
 
 use super::radar::{Radar, complete};
@@ -23,11 +22,9 @@ pub const SCANS: usize = 12;
 /// A recording with the logs of a gyro and of wheels. All its rows are measured, because a radar
 /// sends no others.
 pub fn with_log() -> TempDir {
-    let simulation = format!("scans = {SCANS}\n{}", recording::SENSOR);
-    let mut config: SimulationConfig = toml::from_str(&simulation).unwrap();
-    config.gyro.profile = GyroProfile::Asm330lhh;
-    config.wheels.rate_hz = 20.0;
-    let drive = recording::of("live-gyro", &config);
+    let sensors = "gyro.profile = 'asm330lhh'\nwheels.rate_hz = 20.0\n";
+    let settings = format!("scans = {SCANS}\n{}{sensors}", recording::SENSOR);
+    let drive = recording::configured("live-gyro", &settings);
     complete(recording::linked(&drive, |_| true))
 }
 

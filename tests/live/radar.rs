@@ -92,15 +92,7 @@ pub(crate) struct Played {
 /// A run without end of a radar at an address, with the constants that the recording has in its
 /// `dataset.toml`.
 pub(crate) fn run_at(address: &str) -> Run {
-    let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
-    let settings: toml::Table = settings.parse().unwrap();
-    let run = Run::small().option(address);
-    let known = settings.iter().filter(|(key, _)| *key != "format");
-    known
-        .fold(run, |run, (key, value)| {
-            run.set(&format!("dataset.{key}={value}"))
-        })
-        .set("source.silence_s=1")
+    recording::with_constants(Run::small().option(address)).set("source.silence_s=1")
 }
 
 /// A copy of so many scans of the small recording. All its rows are measured, because a radar sends
@@ -215,8 +207,7 @@ fn a_radar_that_is_not_there_yet_is_waited_for_and_a_signal_ends_the_wait() {
     let mut running = run.start();
     running.await_words(&waits);
     ask(&run, &["ps", "--check"]).refused_with(&[&waits]);
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
+    running.interrupt();
     let mut running = run.start();
     running.await_words(&waits);
     let _radar = Radar::to(&["--listen", &free], recording::small(), &[]);

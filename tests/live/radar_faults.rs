@@ -160,8 +160,7 @@ fn datagrams_of_others_are_passed_over_and_counted() {
     let to = group(5);
     let radar = Radar::sending(&to, recording::small(), &["--repeat"]);
     let run = radar.received(12);
-    let mut running = run.start();
-    running.await_poses(2);
+    let mut running = run.started(2);
     let options = ["--repeat", "--rate", "1"];
     let _other = Radar::to(&["--udp", &to], recording::small(), &options);
     let forger = UdpSocket::bind("127.0.0.1:0").unwrap();

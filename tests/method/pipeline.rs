@@ -1,17 +1,18 @@
 //! `gyre run` as a whole: six processes, the same result every time, whatever interrupts it.
 
-use std::{collections::BTreeSet, fs, process::Command};
+use std::{collections::BTreeSet, process::Command};
 
-use crate::common::{Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
+use crate::common::{
+    Run, STAGES, leftovers, odometry, processes,
+    recording::{self, MIDDLE, MODERATE},
+    undisturbed,
+};
 use rustix::process::Signal;
-
-/// Slow enough to be disturbed in the middle: the recording's six seconds in one.
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
 
 #[test]
 fn six_processes_of_their_own_are_there_while_it_runs() {
-    let mut running = Run::of_recording().rate(MODERATE).start();
+    let run = Run::of_recording().rate(MODERATE);
+    let mut running = run.start();
     let stages = running.await_stages();
     assert_eq!(
         stages.keys().map(String::as_str).collect::<BTreeSet<_>>(),
@@ -19,12 +20,9 @@ fn six_processes_of_their_own_are_there_while_it_runs() {
     );
     let pids: BTreeSet<_> = stages.values().copied().chain([running.pid()]).collect();
     assert_eq!(pids.len(), STAGES.len() + 1, "{stages:?}");
-    for pid in stages.values() {
-        let environment = fs::read(format!("/proc/{pid}/environ")).unwrap();
-        assert!(
-            String::from_utf8_lossy(&environment).contains(&running.mark()),
-            "the run's place is named after --out"
-        );
+    for pid in stages.into_values() {
+        // Its place is named after --out.
+        assert_eq!(processes::run_of(pid), Some(leftovers::root(run.out())));
     }
     running.finish().succeeded();
 }
@@ -75,22 +73,6 @@ fn all_results_are_there_and_account_for_every_scan() {
 }
 
 #[test]
-fn a_run_without_truth_leaves_no_judgement_of_an_earlier_one() {
-    let judged = Run::of_recording();
-    judged.complete();
-    let copy = recording::copy(recording::SCANS);
-    fs::remove_dir_all(copy.path().join("gt")).unwrap();
-    let unjudged = Run::of_recording_named(copy.path().to_str().unwrap())
-        .option("--fresh")
-        .into(judged.out());
-    unjudged.complete();
-    assert!(unjudged.summary()["evaluation"].is_null());
-    for plot in ["errors.svg", "bands.svg"] {
-        assert!(!judged.out().join(plot).exists(), "{plot}");
-    }
-}
-
-#[test]
 fn a_repetition_gives_the_same_bytes() {
     let run = Run::of_recording();
     assert_eq!(run.complete(), undisturbed());
@@ -98,23 +80,8 @@ fn a_repetition_gives_the_same_bytes() {
 }
 
 #[test]
-fn the_resolved_configuration_repeats_the_run() {
-    let run = Run::of_recording()
-        .set("masking.threshold=70")
-        .set("rotation.window=hann");
-    let odometry = run.complete();
-    assert_ne!(odometry, undisturbed());
-    assert_eq!(
-        Run::of_file(&run.out().join("config.toml")).complete(),
-        odometry
-    );
-}
-
-#[test]
 fn the_resolved_configuration_plays_the_data_that_were_named_instead_of_a_simulation() {
-    let run =
-        Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 3\nseed = 5\n");
-    let run = run.data(recording::small());
+    let run = Run::simulated(3).data(recording::small());
     assert_eq!(run.complete(), undisturbed());
     assert_eq!(
         Run::of_file(&run.out().join("config.toml")).complete(),
@@ -130,11 +97,7 @@ fn an_interrupted_run_names_how_it_is_resumed_and_resumes_at_another_rate_and_wi
     running.await_poses(MIDDLE).signal(Signal::INT);
     let ended = running.finish();
     assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
-    assert!(
-        ended.stdout.contains("the same command resumes"),
-        "{}",
-        ended.stdout
-    );
+    ended.prints("the same command resumes");
     let processed = run.summary()["processed"].as_u64().unwrap();
     let partial = MIDDLE as u64..recording::SCANS as u64;
     assert!(partial.contains(&processed), "{processed}");
@@ -155,21 +118,6 @@ fn two_runs_at_once_do_not_disturb_each_other() {
     slow.finish().succeeded();
     assert_eq!(runs[0].odometry(), undisturbed());
     assert_eq!(runs[1].odometry(), alone);
-}
-
-#[test]
-fn a_stage_may_have_a_command_of_its_own() {
-    // The second one keeps a shell in between.
-    for last in [
-        "exec '{gyre}' stage masking",
-        "'{gyre}' stage masking; exit $?",
-    ] {
-        let script = format!("touch $0.ran; {last}");
-        let run = Run::of_recording().stage_script("masking", &script);
-        assert_eq!(run.complete(), undisturbed());
-        assert!(run.folder().join("masking.sh.ran").is_file());
-        assert_nothing_left(run.out());
-    }
 }
 
 #[test]

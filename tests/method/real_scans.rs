@@ -65,15 +65,3 @@ fn fog_without_ground_truth_is_run_all_the_same() {
     assert_eq!(odometry::rows(&run.complete()).len(), 17);
     assert!(run.summary()["evaluation"].is_null());
 }
-
-#[test]
-fn a_sample_of_one_scan_is_refused_with_the_reason() {
-    let Some(data) = real_data("samples") else {
-        return;
-    };
-    for sample in ["boreas-rt-2024-12-03", "fomo-2025-10-14"] {
-        let run = Run::configured("").data(&data.join(sample));
-        run.finish()
-            .refused_with(&[sample, "has 1 scan:", "a motion is between two"]);
-    }
-}

@@ -3,9 +3,16 @@
 
 use std::{collections::BTreeSet, fs};
 
-use crate::common::{Run, STAGES, odometry::columns, recording, undisturbed};
+use crate::{
+    common::{
+        Run, STAGES,
+        odometry::columns,
+        recording::{self, MIDDLE},
+        undisturbed,
+    },
+    restart::results::interrupted,
+};
 use gyre_journal::{self as journal, Journal};
-use rustix::process::Signal;
 use serde_json::Value;
 
 const REFINEMENT: &str = "refinement";
@@ -18,13 +25,6 @@ const SEARCHED: [&str; 5] = [
     "runner_up_score",
 ];
 const MOTION: [&str; 3] = ["x_m", "y_m", "yaw_rad"];
-/// The recording's six seconds in one.
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
-
-fn without() -> Run {
-    Run::of_recording().set("refinement.kind=none")
-}
 
 pub fn names(object: &Value) -> BTreeSet<String> {
     object.as_object().unwrap().keys().cloned().collect()
@@ -54,7 +54,7 @@ fn each_motion_is_counted_by_how_its_refinement_ended() {
 /// motions are refined or not.
 #[test]
 fn a_run_that_does_not_refine_has_the_searched_motions_which_are_farther_from_the_truth() {
-    let run = without();
+    let run = Run::of_recording().set("refinement.kind=none");
     let odometry = run.complete();
     let summary = run.summary();
     assert!(summary.get("motions").is_none());
@@ -79,24 +79,11 @@ fn a_run_that_does_not_refine_has_the_searched_motions_which_are_farther_from_th
 
 // Its map.
 
-fn interrupted() -> Run {
-    let run = Run::of_recording();
-    let mut running = run.clone().rate(MODERATE).start();
-    running.await_poses(MIDDLE).signal(Signal::INT);
-    assert_eq!(running.finish().code(), Some(130));
-    run
-}
-
-/// Returns what damage can leave of a map.
-fn damages(whole: &[u8]) -> [Vec<u8>; 4] {
-    let flip = |(k, byte): (usize, &u8)| if k > 100 { !byte } else { *byte };
-    let flipped = whole.iter().enumerate().map(flip).collect();
-    [
-        Vec::new(),
-        whole[..100].to_vec(),
-        b"not a map".to_vec(),
-        flipped,
-    ]
+/// Damages the map of a run. What damage leaves of a map is tested beside its reader.
+fn damage(run: &Run) {
+    let map = run.out().join(MAP);
+    let whole = fs::read(&map).unwrap();
+    fs::write(&map, &whole[..100]).unwrap();
 }
 
 /// Appends poses to the journal that the map does not know, as a power failure can leave them.
@@ -113,31 +100,22 @@ fn append_unknown_poses(run: &Run, poses: u64) {
 
 #[test]
 fn a_map_that_was_lost_soon_after_the_start_lets_the_run_begin_anew() {
-    for k in 0..4 {
-        let run = interrupted();
-        let map = run.out().join(MAP);
-        let damaged = &damages(&fs::read(&map).unwrap())[k];
-        fs::write(&map, damaged).unwrap();
-        let ended = run.finish();
-        let said = &ended.succeeded().stderr;
-        assert!(said.contains("knows none of the"), "{said}");
-        assert_eq!(run.odometry(), undisturbed());
-    }
+    let run = interrupted();
+    damage(&run);
+    run.finish().succeeded().says("knows none of the");
+    assert_eq!(run.odometry(), undisturbed());
 }
 
 #[test]
 fn a_lost_or_damaged_map_is_reported_and_the_run_can_be_started_anew() {
     let run = interrupted();
     append_unknown_poses(&run, 64);
-    let map = run.out().join(MAP);
-    for damaged in damages(&fs::read(&map).unwrap()) {
-        fs::write(&map, damaged).unwrap();
-        run.finish().refused_with(&[
-            "refinement.map",
-            "does not have the state of the refinement",
-            "--fresh",
-        ]);
-    }
+    damage(&run);
+    run.finish().refused_with(&[
+        "refinement.map",
+        "does not have the state of the refinement",
+        "--fresh",
+    ]);
     assert_eq!(run.option("--fresh").complete(), undisturbed());
 }
 
@@ -146,9 +124,8 @@ fn poses_that_the_map_does_not_know_are_cut_off_and_computed_anew() {
     let run = interrupted();
     append_unknown_poses(&run, 70);
     let ended = run.finish();
-    let said = &ended.succeeded().stderr;
     let words = "a power failure took the last 70 poses";
-    assert!(said.contains(words), "{said}");
+    ended.succeeded().says(words);
     assert_eq!(run.odometry(), undisturbed());
     assert!(run.summary()["resumed_after"].as_u64().unwrap() >= MIDDLE as u64);
 }

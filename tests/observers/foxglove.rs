@@ -8,7 +8,7 @@ use std::{
     process::Command,
 };
 
-use rustix::process::Signal;
+use gyre_client::Usage;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -77,8 +77,7 @@ fn driving(rate: &str) -> Run {
 }
 
 fn started(run: &Run) -> (Running, Server) {
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     let options = ["--foxglove", "127.0.0.1:0"];
     (running, Server::start(run, "127.0.0.1", &options))
 }
@@ -102,8 +101,7 @@ fn a_viewer_receives_the_scans_of_the_recording_and_the_motions_of_the_results()
     viewer.args(["-c", VIEW, &server.foxglove(), "8"]);
     let ended = Ended::of(viewer);
     ended.succeeded();
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
+    running.interrupt();
     server.interrupt();
 
     let received: Value = serde_json::from_str(&ended.stdout).unwrap();
@@ -209,8 +207,7 @@ fn viewers_of_other_sites_and_machines_need_the_token() {
     let lichtblick = [SDK, "Origin: http://lichtblick.example"];
     assert_eq!(status(&url, &format!("?{query}"), &lichtblick), "101");
     closed.interrupt();
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
+    running.interrupt();
 }
 
 #[test]
@@ -225,11 +222,11 @@ fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
     let request = serde_json::json!({"op": "subscribe", "subscriptions": channels});
     stalled.write_all(&frame(&request.to_string())).unwrap();
     running.await_poses(20);
-    let early = own_bytes(server.pid());
+    let own_bytes = || Usage::of(server.pid()).unwrap().own_bytes;
+    let early = own_bytes();
     running.await_poses(recording::SCANS_AROUND);
-    let late = own_bytes(server.pid());
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed);
+    let late = own_bytes();
+    assert_eq!(running.complete(), undisturbed);
     // A hundred scans and rasters are more than twice that.
     assert!(late < early + (16 << 20), "from {early} to {late} bytes");
     server.interrupt();
@@ -239,14 +236,4 @@ fn a_viewer_that_never_reads_costs_neither_memory_nor_the_run() {
 fn frame(text: &str) -> Vec<u8> {
     let length = (text.len() as u16).to_be_bytes();
     [&[0x81, 0xfe][..], &length, &[0; 4], text.as_bytes()].concat()
-}
-
-/// Private memory of a process, without the mapped memory of the run.
-fn own_bytes(pid: u32) -> u64 {
-    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("RssAnon:"));
-    let kilobytes = line.unwrap().trim().trim_end_matches(" kB");
-    kilobytes.parse::<u64>().unwrap() << 10
 }

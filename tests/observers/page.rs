@@ -2,10 +2,8 @@
 
 use std::{thread, time::Duration};
 
-use rustix::process::Signal;
-
 use crate::{
-    common::{Browser, Run, Running, Server},
+    common::{Browser, Run, Server},
     operate::commands::ask,
 };
 
@@ -20,17 +18,6 @@ fn small(scans: usize) -> Run {
     run.set(&format!("source.scans={scans}"))
 }
 
-fn started(run: &Run) -> Running {
-    let mut running = run.start();
-    running.await_poses(1);
-    running
-}
-
-fn interrupt(running: Running) {
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
-}
-
 fn status(answer: &str) -> &str {
     answer.lines().next().unwrap_or_default()
 }
@@ -38,7 +25,7 @@ fn status(answer: &str) -> &str {
 #[test]
 fn other_machines_need_the_token_and_this_one_none() {
     let run = long();
-    let running = started(&run);
+    let running = run.started(1);
     let server = Server::start(&run, "127.0.0.1", &[]);
     assert_eq!(server.token(), None);
     let page = server.get("/", &[]);
@@ -74,7 +61,7 @@ fn other_machines_need_the_token_and_this_one_none() {
     let bearer = format!("Authorization: Bearer {token}");
     assert!(status(&server.get("/metrics", &[&bearer])).contains("200"));
     server.interrupt();
-    interrupt(running);
+    running.interrupt();
 }
 
 #[test]
@@ -83,8 +70,7 @@ fn a_folder_without_a_run_is_named_with_how_one_is_started() {
     let no_run = format!("no run is writing to {}", run.out().display());
     let refused = |end: &str| {
         let sentence = format!("{end}: `gyre run` starts one, and its --out names the folder");
-        let ended = ask(&run, &["watch", "--listen", "127.0.0.1:0"]);
-        ended.refused_with(&[&no_run, &sentence]);
+        ask(&run, &["watch", "--listen", "127.0.0.1:0"]).refused_with(&[&no_run, &sentence]);
     };
     let nothing = run.out().display().to_string();
     refused(&nothing);
@@ -100,7 +86,7 @@ const WORK: &str = "gyre_hop_seconds_count{stage=\"masking\",part=\"work\"}";
 #[test]
 fn metrics_count_poses_delays_and_restarts() {
     let run = long();
-    let mut running = started(&run);
+    let mut running = run.started(1);
     let server = Server::start(&run, "127.0.0.1", &[]);
     let value = |metrics: &str, series: &str| -> f64 {
         let line = metrics.lines().find_map(|line| line.strip_prefix(series));
@@ -130,7 +116,7 @@ fn metrics_count_poses_delays_and_restarts() {
     }
     assert!(metrics.contains("content-type: application/openmetrics-text"));
     assert!(metrics.trim_end().ends_with("# EOF"), "{metrics}");
-    interrupt(running);
+    running.interrupt();
     server.interrupt();
 }
 
@@ -142,7 +128,7 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
         return;
     };
     let run = long();
-    let mut running = started(&run);
+    let mut running = run.started(1);
     let server = Server::start(&run, "127.0.0.1", &[]);
     browser.resize(1440, 900, false).go_to(&server.address);
     browser.until("document.getElementById('state').textContent === 'Running'");
@@ -156,7 +142,7 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
     let poses = browser.evaluate(POSES).as_f64().unwrap();
     browser.until(&format!("{POSES} > {}", poses + 4.0));
     fits_a_phone(&mut browser);
-    interrupt(running);
+    running.interrupt();
     browser.until("document.getElementById('state').textContent === 'Ended early'");
     let banner = browser.text("banner");
     assert!(banner.contains("The same command continues it"));

@@ -15,9 +15,9 @@ use serde_json::Value;
 
 use crate::{
     common::{
-        Ended, Run, Running, gyre, odometry, processes, python, real_data,
+        Ended, Run, finished, odometry, python,
         recording::{SCANS, around_a_block},
-        send, undisturbed,
+        send, undisturbed, with_tmpfs,
     },
     operate::commands::{ask, await_status, process},
     reach::{only_if, python_has},
@@ -53,34 +53,18 @@ pub fn replay(recording: &Path, arguments: &[&str]) -> String {
 
 pub fn replayed(recording: &Path, arguments: &[&str]) -> (Run, Ended) {
     let run = Run::configured("");
-    let mut command = gyre();
-    command.arg("run").arg(recording);
-    command.args(arguments).arg("--out").arg(run.out());
-    (run, Ended::of(command))
+    let ended = finished!["run", recording, "--out", run.out(); arguments];
+    (run, ended)
 }
 
 pub fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
     recording.entries(topic).map(|entry| entry.seq).collect()
 }
 
-/// Waits for a recorder of the run other than `not`.
-pub fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
-    loop {
-        let recorder = processes::child_with(running.pid(), "record");
-        if let Some(pid) = recorder.filter(|pid| Some(*pid) != not) {
-            return pid;
-        }
-        assert!(!running.is_over(), "the run ended without a recorder");
-        thread::sleep(Duration::from_millis(5));
-    }
-}
-
 #[test]
 fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
     let run = recorded(&played()).set(ALL);
-    let ended = run.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("missed nothing"), "{}", ended.stderr);
+    run.finish().succeeded().says("missed nothing");
     assert_eq!(run.odometry(), undisturbed());
     let recording = open_recording(&file(&run)).unwrap();
     for topic in ["scan", "masked", "rotation", "motion", "refined", "pose"] {
@@ -93,9 +77,11 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
         let odometry = replay(&file(&run), &["--from", topic]);
         assert_eq!(odometry, undisturbed(), "from {topic}");
     }
-    let mut inspect = gyre();
-    inspect.args(["inspect", "--json"]).arg(file(&run));
-    let report: Value = serde_json::from_str(&Ended::of(inspect).succeeded().stdout).unwrap();
+    let other = Run::configured("").data(&file(&run));
+    let other = other.set("dataset.range_offset_m=0.5").finish();
+    other.refused_with(&["range_offset_m", "that they were recorded with"]);
+    let inspected = finished!["inspect", "--json", file(&run)];
+    let report: Value = serde_json::from_str(&inspected.succeeded().stdout).unwrap();
     assert_eq!(report["format"], "mcap");
     assert_eq!(report["scans"], SCANS);
     assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
@@ -104,14 +90,11 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
 #[test]
 fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() {
     let run = recorded(&played()).rate("1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
-    let killed = await_recorder(&mut running, None);
+    let mut running = run.started(SCANS / 4);
+    let killed = running.await_child("record", None);
     send(killed, Signal::KILL);
-    await_recorder(&mut running, Some(killed));
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("started again"), "{}", ended.stderr);
+    running.await_child("record", Some(killed));
+    running.finish().succeeded().says("started again");
     assert_eq!(run.odometry(), undisturbed());
     assert_eq!(parts(&file(&run)).len(), 2);
     let recording = open_recording(&file(&run)).unwrap();
@@ -155,9 +138,8 @@ fn await_file(path: &Path) {
 #[test]
 fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     let run = recorded(&played()).set(ALL).rate("1").set("run.window=1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
-    let recorder = await_recorder(&mut running, None);
+    let mut running = run.started(SCANS / 4);
+    let recorder = running.await_child("record", None);
     send(recorder, Signal::STOP);
     running.await_poses(SCANS - 4);
     send(recorder, Signal::CONT);
@@ -195,15 +177,14 @@ fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
 #[test]
 fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_counted() {
     let run = recorded(&played()).rate("1").set("run.window=1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
-    let killed = await_recorder(&mut running, None);
+    let mut running = run.started(SCANS / 4);
+    let killed = running.await_child("record", None);
     // It writes nothing from here on, so that the gap is longer than the history of the topics,
     // however fast the machine is.
     send(killed, Signal::STOP);
     running.await_poses(SCANS - 8);
     send(killed, Signal::KILL);
-    await_recorder(&mut running, Some(killed));
+    running.await_child("record", Some(killed));
     let ended = running.finish();
     ended.succeeded();
     counted_as_missed(&run, &ended);
@@ -213,9 +194,8 @@ fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_count
 #[test]
 fn a_recorder_that_dies_right_before_the_end_is_reported() {
     let run = recorded(&played()).rate("1").set("record.topics=['scan']");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
-    let recorder = await_recorder(&mut running, None);
+    let mut running = run.started(SCANS / 4);
+    let recorder = running.await_child("record", None);
     send(recorder, Signal::STOP);
     running.await_poses(SCANS);
     send(recorder, Signal::KILL);
@@ -259,8 +239,7 @@ fn the_recorder_is_listed_with_the_health_that_it_records_and_started_again_on_r
     recorder("a restart after its death", &|it| {
         it["restarts"] == 2 && it["last_death"] == "signal 9"
     });
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let parts = parts(&file(&run));
     assert_eq!(parts.len(), 3);
     let scans = seqs(&open_recording(&file(&run)).unwrap(), "scan");
@@ -291,27 +270,6 @@ fn a_recording_holds_what_sensors_measured_and_replays_with_and_without_it() {
 }
 
 #[test]
-fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
-    let run = played().rate("1").set("run.window=1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 3);
-    let mut record = gyre();
-    record.arg("record").arg(run.out());
-    record.args(["--topics", "scan,masked", "--to"]);
-    record.arg(file(&run));
-    let mut recorder = record.spawn().unwrap();
-    running.finish().succeeded();
-    recorder.wait().unwrap();
-    let recording = open_recording(&file(&run)).unwrap();
-    let scans = seqs(&recording, "scan");
-    assert!(!scans.is_empty() && scans[0] > 0, "{scans:?}");
-    // A scan before the recorder came is not there, and the stages after `masked` need it.
-    let replay = Run::small().data(&file(&run)).argument("--from", "masked");
-    let lacks = "lacks message 0 of topic `masked`";
-    replay.finish().refused_with(&[lacks]);
-}
-
-#[test]
 fn a_recording_without_the_topic_that_is_played_is_refused_with_how_to_record_it() {
     let run = recorded(&played());
     run.complete();
@@ -326,49 +284,21 @@ fn a_recording_without_the_topic_that_is_played_is_refused_with_how_to_record_it
 }
 
 #[test]
-fn a_recording_is_not_overwritten() {
-    let run = recorded(&played());
-    fs::write(file(&run), "mine").unwrap();
-    run.finish()
-        .refused_with(&["drive.mcap exists", "never overwritten"]);
-    assert_eq!(fs::read_to_string(file(&run)).unwrap(), "mine");
-}
-
-#[test]
 fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
     let run = played();
     let place = run.folder().join("small");
     fs::create_dir(&place).unwrap();
     let file = place.join("drive.mcap");
     let recorded = run.clone().argument("--record", file.to_str().unwrap());
-    let Some(command) = recorded.with_tmpfs(&place, "size=512k") else {
+    let Some(command) = with_tmpfs(&recorded.command(), &place, "size=512k") else {
         return;
     };
     let ended = recorded.start_as(command).finish();
     ended.succeeded();
     for part in ["No space left", "the run continues"] {
-        assert!(ended.stderr.contains(part), "{}", ended.stderr);
+        ended.says(part);
     }
     assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-fn real_scans_replay_to_the_same_bytes() {
-    let Some(data) = real_data("radiate-2019-02-12") else {
-        return;
-    };
-    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = Run::of_file(&configuration).data(&data);
-    let run = run.set("source.scans=20").set(WINDOW);
-    let run = recorded(&run).set(ALL);
-    let odometry = run.complete();
-    assert_eq!(replay(&file(&run), &[]), odometry);
-    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
-    let configured = Run::of_file(&configuration).data(&file(&run));
-    assert_eq!(configured.complete(), odometry);
-    let other = configured.set("dataset.range_offset_m=0.5");
-    let words = ["range_offset_m", "that they were recorded with"];
-    other.finish().refused_with(&words);
 }
 
 /// Prints the objects of a recording, as the Python package `mcap` decodes them by their schema: of

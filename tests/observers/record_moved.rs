@@ -5,8 +5,8 @@ use std::{fs, path::Path};
 use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
 
-use super::record::{await_recorder, file, played, recorded, replay, seqs};
-use crate::common::{Ended, gyre, recording::SCANS, send, undisturbed};
+use super::record::{file, played, recorded, replay, seqs};
+use crate::common::{finished, recording::SCANS, send, undisturbed};
 
 /// Moves all parts but the newest one; returns how many.
 fn move_away(recording: &Path, to: &Path) -> usize {
@@ -25,25 +25,21 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     let run = recorded(&played()).rate("1").set("record.split_s=0.7");
     let other_disk = run.folder().join("disk");
     fs::create_dir(&other_disk).unwrap();
-    let mut running = run.start();
-    running.await_poses(SCANS / 3);
+    let mut running = run.started(SCANS / 3);
     let moved = move_away(&file(&run), &other_disk);
     assert!(moved > 0);
     // A new recorder continues without the first part.
-    let killed = await_recorder(&mut running, None);
+    let killed = running.await_child("record", None);
     send(killed, Signal::KILL);
-    await_recorder(&mut running, Some(killed));
+    running.await_child("record", Some(killed));
     running.await_poses(2 * SCANS / 3);
     let moved = moved + move_away(&file(&run), &other_disk);
     running.finish().succeeded();
     // The rest is a recording without its first part, and reports it.
     let rest = open_recording(&file(&run)).unwrap();
     assert!(rest.absent_parts().contains(&1));
-    let mut inspect = gyre();
-    inspect.arg("inspect").arg(file(&run));
-    let inspected = Ended::of(inspect);
-    let said = &inspected.stdout;
-    assert!(said.contains("Part 1 of the recording"), "{said}");
+    let inspected = finished!["inspect", file(&run)];
+    inspected.prints("Part 1 of the recording");
     let left = parts(&file(&run));
     for part in &left {
         fs::rename(part, other_disk.join(part.file_name().unwrap())).unwrap();

@@ -44,8 +44,7 @@ fn a_recording_goes_on_in_the_next_file_and_each_message_is_in_one_of_them() {
 #[test]
 fn a_recorder_from_outside_goes_on_in_the_next_file_too() {
     let run = played().rate("1");
-    let mut running = run.start();
-    running.await_poses(SCANS / 4);
+    let running = run.started(SCANS / 4);
     let mut record = gyre();
     record.arg("record").arg(run.out()).arg("--to");
     record.arg(file(&run)).args(["--split-s", "0.7"]);

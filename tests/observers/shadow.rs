@@ -1,23 +1,16 @@
 //! `gyre shadow`: a second program beside a stage of a running run. The shadow never changes the
 //! run; its answers are compared.
 
-use std::{
-    fs::{self, File},
-    path::{Path, PathBuf},
-    process::{Child, Stdio},
-    sync::OnceLock,
-    thread,
-    time::{Duration, Instant},
-};
+use std::{fs, path::PathBuf, sync::OnceLock};
 
 use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::{
-    common::{Ended, Pid, Run, Running, gyre, processes, send, undisturbed},
+    common::{Ended, Pid, Run, Running, Spawned, gyre, processes, send, undisturbed},
     input::breaks,
     method::learned_masks::{TWO_SCANS, card},
-    operate::commands::ask,
+    operate::commands::{ask, up},
     reach::conformance,
 };
 
@@ -47,8 +40,7 @@ fn undisturbed_long() -> &'static str {
 
 /// Starts a run, and holds it after some poses: it does not end before shadows are there.
 fn held(run: &Run) -> Running {
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     hold(&running);
     running
 }
@@ -64,7 +56,7 @@ fn release(running: &Running) {
 
 /// A running shadow, and its output.
 struct Shadow {
-    child: Child,
+    process: Spawned,
     report: PathBuf,
 }
 
@@ -73,40 +65,28 @@ impl Shadow {
     fn start(run: &Run, name: &str, stage: &str, options: &[&str]) -> Self {
         let report = run.folder().join(name);
         fs::create_dir_all(&report).unwrap();
-        let file = |name: &str| File::create(report.join(name)).unwrap();
         let mut command = gyre();
         command.args(["shadow", stage]).arg(run.out());
         command.arg("--report").arg(&report).args(options);
-        command.stdin(Stdio::null());
-        command.stdout(file("stdout")).stderr(file("stderr"));
-        let child = command.spawn().unwrap();
-        Self { child, report }
+        let process = Spawned::new(command, report.join("said"));
+        Self { process, report }
     }
 
     /// Waits until it observes the run.
     fn await_attached(&self) {
-        self.until("attached", |said| said.contains("beside"));
+        self.process
+            .until(|said| said.contains("beside").then_some(()));
     }
 
     /// Waits until it has compared so many items.
     fn await_rows(&self, rows: usize) {
-        self.until("rows", |_| self.rows() >= rows);
-    }
-
-    fn until(&self, what: &str, is_so: impl Fn(&str) -> bool) {
-        let since = Instant::now();
-        let said = || fs::read_to_string(self.report.join("stderr")).unwrap();
-        while !is_so(&said()) {
-            assert!(since.elapsed().as_secs() < 60, "no {what}: {}", said());
-            thread::sleep(Duration::from_millis(10));
-        }
+        self.process.until(|_| (self.rows() >= rows).then_some(()));
     }
 
     /// Waits until it has started a stage.
     fn await_process(&self) -> Pid {
-        let stage = || processes::stages_of(self.child.id()).into_values().next();
-        self.until("process", |_| stage().is_some());
-        stage().unwrap()
+        let stages = || processes::stages_of(self.process.pid());
+        self.process.until(|_| stages().into_values().next())
     }
 
     fn rows(&self) -> usize {
@@ -116,12 +96,12 @@ impl Shadow {
 
     /// Waits until it ends; returns its exit code and its report.
     fn end(mut self) -> (Option<i32>, Value) {
-        let code = self.child.wait().unwrap().code();
-        let said = |name| fs::read_to_string(self.report.join(name)).unwrap();
-        println!("{}\n{}", said("stderr"), said("stdout"));
+        let (code, said) = (self.process.wait().code(), self.process.said());
+        println!("{said}");
         let report = fs::read_to_string(self.report.join("shadow.json"));
         let report: Value = serde_json::from_str(&report.unwrap()).unwrap();
-        if let Ok(printed) = serde_json::from_str::<Value>(&said("stdout")) {
+        if let Some(at) = said.find("\n{") {
+            let printed: Value = serde_json::from_str(&said[at..]).unwrap();
             assert_eq!(printed, report);
         }
         assert_accounted(&report["counts"]);
@@ -172,8 +152,7 @@ fn shadows_that_fail_in_any_way_are_named_and_the_run_is_untouched() {
     ];
     shadows.iter().for_each(|shadow| shadow.await_rows(1));
     release(&running);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed_long());
+    assert_eq!(running.complete(), undisturbed_long());
     let [differs, slow, floods, dies, silent] = shadows;
 
     let (code, report) = differs.end();
@@ -212,8 +191,7 @@ fn a_program_that_does_not_come_is_given_up_while_the_run_goes_on() {
         assert!(report["ends"].to_string().contains(words), "{report:#}");
     }
     release(&running);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
@@ -266,8 +244,7 @@ fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
 fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
     let run = long().rate(HALF_RATE).set("run.mode=live");
     let run = run.set("stages.masking.delay_ms=50");
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     let shadow = Shadow::start(&run, "masking", "masking", &[]);
     // With many scans dropped, motions may be too long for the radar: that is a problem of its own.
     running.finish();
@@ -280,9 +257,7 @@ fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
 fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
     let run = Run::of_recording().rate("0.3").set("raster.n=63");
     let run = run.set("search.kind=exhaustive");
-    let mut up = gyre();
-    up.arg("up").args(run.command().get_args().skip(1));
-    Ended::of(up).succeeded();
+    Ended::of(up(&run)).succeeded();
     let options = ["--scans", "3", "--nice", "15"];
     let shadow = Shadow::start(&run, "joint", "joint-search", &options);
     let (code, report) = shadow.end();
@@ -302,21 +277,18 @@ fn an_interrupted_shadow_reports_and_the_program_of_a_killed_one_ends() {
     let [interrupted, mut killed] =
         ["interrupted", "killed"].map(|name| Shadow::start(&run, name, "rotation-search", &[]));
     interrupted.await_rows(1);
-    send(interrupted.child.id(), Signal::INT);
+    interrupted.process.signal(Signal::INT);
     let (code, report) = interrupted.end();
     assert_eq!((code, &report["verdict"]), (Some(0), &"identical".into()));
     killed.await_rows(1);
     let process = killed.await_process();
-    send(killed.child.id(), Signal::KILL);
-    killed.child.wait().unwrap();
-    let since = Instant::now();
-    while Path::new("/proc").join(process.to_string()).exists() {
-        assert!(since.elapsed().as_secs() < 30, "it outlives its shadow");
-        thread::sleep(Duration::from_millis(10));
-    }
+    killed.process.kill();
+    // It does not outlive its shadow.
+    killed
+        .process
+        .until(|_| (!processes::is_alive(process)).then_some(()));
     release(&running);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 fn refused(run: &Run, arguments: &[&str], words: &[&str]) {

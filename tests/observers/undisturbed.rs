@@ -47,8 +47,7 @@ fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
     let [resumed, never_resumed] = stopped;
     running.await_poses_or_end(SCANS / 2);
     resumed.signal(Signal::CONT);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), around().complete());
+    assert_eq!(running.complete(), around().complete());
     for looker in lookers {
         assert!(looker.finish().assert_consistent(scans).total.is_some());
     }
@@ -62,13 +61,11 @@ fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
 #[test]
 fn the_places_of_killed_observers_are_freed() {
     let run = around().rate("4");
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     for _ in 0..2 {
         let watches: Vec<_> = (0..PLACES).map(|_| Watch::start(&run, "pose")).collect();
         let attached = watches.into_iter().map(Watch::await_message);
         drop(attached.collect::<Vec<_>>());
     }
-    running.signal(Signal::TERM);
-    assert_eq!(running.finish().code(), Some(130));
+    running.interrupt();
 }

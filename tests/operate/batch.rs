@@ -16,7 +16,9 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 pub(crate) use drives::Drives;
 
-use crate::common::{Ended, assert_nothing_left, gyre, leftovers, processes, recording, send};
+use crate::common::{
+    Ended, assert_nothing_left, gyre, leftovers, poses_of, processes, recording, send, with_tmpfs,
+};
 
 /// A batch takes seconds, far more only on a loaded machine.
 const LIMIT: Duration = Duration::from_secs(180);
@@ -94,8 +96,7 @@ impl Batch<'_> {
     }
 
     fn poses(&self, name: &str) -> usize {
-        let path = journal::path(&self.results(name));
-        journal::records(&path).map_or(0, |records| records.into_iter().flatten().count())
+        poses_of(&self.results(name))
     }
 
     pub fn table(&self) -> String {
@@ -211,7 +212,7 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     assert_eq!(ended.code(), Some(1));
     assert_eq!(calm.outcomes(), OUTCOMES);
     let said = "9 drives: 4 complete, 1 corrupt, 1 unsure, 3 failed";
-    assert!(ended.stdout.contains(said), "{}", ended.stdout);
+    ended.prints(said);
     // A line for each.
     let lines = |words: &str| ended.stderr.lines().filter(|it| it.contains(words)).count();
     for words in [
@@ -295,16 +296,17 @@ fn a_drive_is_computed_again_with_another_configuration_alone() {
     };
     batch.finish().succeeded();
     let first = changed();
-    let again = batch.finish();
-    let said = &again.succeeded().stdout;
-    assert!(said.contains("1 had been computed before"), "{said}");
+    batch
+        .finish()
+        .succeeded()
+        .prints("1 had been computed before");
     assert_eq!(changed(), first);
 
     let other = batch.clone().with(&["--set", "search.kind='exhaustive'"]);
     let collected = other.clone().with(&["--collect"]).finish();
     assert_eq!(collected.code(), Some(1));
     let reason = "part-6: not-run: it was computed with other settings";
-    assert!(collected.stderr.contains(reason), "{}", collected.stderr);
+    collected.says(reason);
     let ended = other.finish();
     let said = &ended.succeeded().stdout;
     assert!(!said.contains("before"), "{said}");
@@ -366,31 +368,17 @@ fn an_interrupted_batch_keeps_what_it_has_and_goes_on() {
 fn a_batch_or_a_task_that_cannot_be_is_refused_in_a_sentence() {
     let drives = Drives::new().recordings(&[2]);
     let batch = |options: &[&str]| drives.batch("out").with(options).finish();
-    batch(&["--task", "4", "--tasks", "4"]).refused_with(&["no task 4 of 4", "last one is 3"]);
+
     fs::create_dir_all(drives.path("out/rows").parent().unwrap()).unwrap();
     batch(&["--collect"]).refused_with(&["is not the folder of a batch"]);
     fs::remove_file(drives.path("list.csv")).unwrap();
     batch(&[]).refused_with(&["list of drives", "list.csv"]);
 }
 
-/// The end of a batch with a disk of this size at a place, then of that without; `None` if that is
-/// not permitted here.
+/// The end of a batch with a disk of this size at a place; `None` if that is not permitted here.
 fn on_small_disk(batch: &Batch<'_>, place: &Path, size: &str) -> Option<Ended> {
     fs::create_dir_all(place).unwrap();
-    let mut command = Command::new("unshare");
-    let mount = "mount -t tmpfs -o size=\"$1\" tmpfs \"$0\" && shift && exec \"$@\"";
-    let own = batch.command();
-    command
-        .args(["--mount", "sh", "-c", mount])
-        .arg(place)
-        .arg(size);
-    command.arg(own.get_program()).args(own.get_args());
-    let permitted = Command::new("unshare").args(["--mount", "true"]).status();
-    if !permitted.is_ok_and(|status| status.success()) {
-        println!("skipped: a mount namespace of its own is not permitted here");
-        return None;
-    }
-    Some(Ended::of(command))
+    with_tmpfs(&batch.command(), place, &format!("size={size}")).map(Ended::of)
 }
 
 #[test]
@@ -414,7 +402,6 @@ fn a_full_disk_of_the_whole_batch_ends_it_and_the_same_command_continues() {
         return;
     };
     assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
-    let said = &ended.stderr;
-    assert!(said.contains("No space left on device"), "{said}");
+    ended.says("No space left on device");
     batch.finish().succeeded();
 }

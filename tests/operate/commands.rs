@@ -15,22 +15,19 @@ use serde_json::Value;
 use crate::{
     PROGRAM,
     common::{
-        Ended, Pid, Run, Running, STAGES, assert_nothing_left, folder, gyre, recording, send,
-        undisturbed,
+        Ended, Pid, Run, Running, STAGES, assert_nothing_left, can, can_mount, finished, folder,
+        gyre, processes, recording, send, undisturbed,
     },
+    reach::only_if,
 };
 
-/// The recording's six seconds in two.
-const MODERATE: &str = "3";
-/// The same in twenty: time for commands, also while other tests keep the machine busy.
+/// The recording's six seconds in twenty: time for commands, also while other tests keep the
+/// machine busy.
 const SLOW: &str = "0.3";
-const THIRD: usize = recording::SCANS / 3;
 
 /// A command about a run.
 pub(crate) fn ask(run: &Run, arguments: &[&str]) -> Ended {
-    let mut command = gyre();
-    command.args(arguments).arg(run.out());
-    Ended::of(command)
+    finished![; arguments; [run.out()]]
 }
 
 /// The state of a run by `gyre ps --json`; `None` if it does not run. It is named, since the run of
@@ -42,7 +39,7 @@ pub(crate) fn status(run: &Run) -> Option<Value> {
 }
 
 /// The command that starts a run in the background.
-fn up(run: &Run) -> Command {
+pub(crate) fn up(run: &Run) -> Command {
     let mut up = gyre();
     up.arg("up").args(run.command().get_args().skip(1));
     up
@@ -51,11 +48,7 @@ fn up(run: &Run) -> Command {
 /// With a `/dev/shm` of their own no other run is there.
 #[test]
 fn a_run_from_elsewhere_is_not_changed_without_its_name() {
-    let permitted = Command::new("unshare").args(["--mount", "true"]).output();
-    if !permitted.is_ok_and(|output| output.status.success()) {
-        println!("skipped: a mount namespace of its own is not permitted here");
-        return;
-    }
+    only_if!(can_mount());
     let run = Run::of_recording().rate(SLOW);
     let script = "mount -t tmpfs tmpfs /dev/shm || exit 9
         here=$1; shift
@@ -110,8 +103,7 @@ pub(crate) fn process<'a>(status: &'a Value, name: &str) -> &'a Value {
 /// A run of six seconds that has begun.
 pub(crate) fn started() -> (Run, Running) {
     let run = Run::of_recording().rate("1");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     (run, running)
 }
 
@@ -137,7 +129,7 @@ fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
     }
     let failed = check();
     assert_eq!(failed.status.code(), Some(1));
-    assert!(failed.stderr.contains("masking is silent"), "{failed:?}");
+    failed.says("masking is silent");
     send(masking, Signal::CONT);
     ask(&run, &["down"]).succeeded();
     running.finish();
@@ -147,17 +139,14 @@ fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
 #[test]
 fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
     let run = Run::of_recording().rate(SLOW);
-    let started = Ended::of(up(&run));
-    let said = &started.succeeded().stdout;
-    assert!(said.contains("6 processes"), "{said}");
+    Ended::of(up(&run)).succeeded().prints("6 processes");
     let status = await_status(&run, "poses", |status| status["poses"].as_u64() >= Some(4));
     assert_eq!(status["phase"], "running");
     let names = status["processes"].as_array().unwrap().iter();
     assert!(names.map(|it| it["name"].as_str().unwrap()).eq(STAGES));
     let pid = status["pid"].as_u64().unwrap() as Pid;
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    let session = stat.rsplit_once(") ").unwrap().1.split(' ').nth(3).unwrap();
-    assert_eq!(session, pid.to_string(), "it has left the terminal");
+    let session = &processes::stat(pid).unwrap()[3];
+    assert_eq!(*session, pid.to_string(), "it has left the terminal");
     ask(&run, &["down"]).succeeded();
     assert_nothing_left(run.out());
     assert!(!ask(&run, &["down"]).status.success());
@@ -178,73 +167,26 @@ fn a_process_is_started_again_on_request() {
     assert_eq!(process(&status, "translation-search")["pid"], after);
     assert_eq!(process(&status, "translation-search")["restarts"], 1);
     ask(&run, &["restart", "steering"]).refused_with(&["steering", "masking"]);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-fn a_run_that_was_frozen_goes_on_without_a_restart() {
-    let run = Run::of_recording()
-        .rate(MODERATE)
-        .set("run.stall_timeout_s=2");
-    let mut running = run.start();
-    running.await_poses(THIRD / 2);
-    let supervisor = running.pid();
-    let stages: Vec<Pid> = running.await_stages().into_values().collect();
-    let all = || [supervisor].into_iter().chain(stages.iter().copied());
-    all().for_each(|pid| send(pid, Signal::STOP));
-    thread::sleep(Duration::from_secs(4));
-    // The supervisor looks first.
-    send(supervisor, Signal::CONT);
-    thread::sleep(Duration::from_millis(100));
-    stages.iter().for_each(|pid| send(*pid, Signal::CONT));
-    running.finish().succeeded();
-    assert_eq!(run.summary()["restarts"], serde_json::json!({}));
-    assert_eq!(run.odometry(), undisturbed());
-}
-
-#[test]
-fn a_follower_that_hangs_is_restarted_alone_while_odometry_goes_on() {
-    let run = Run::of_recording()
-        .rate("1")
-        .set("slam.kind=graph")
-        .set("run.stall_timeout_s=2");
-    let mut running = run.start();
-    running.await_poses(4);
-    let status = await_status(&run, "followers", |it| {
-        process(it, "loop-closure")["activity"] == "waiting"
-    });
-    let pid = process(&status, "loop-closure")["pid"].as_u64().unwrap() as Pid;
-    send(pid, Signal::STOP);
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("loop-closure hangs"), "{ended:?}");
-    let restarts = run.summary()["restarts"].clone();
-    assert_eq!(restarts, serde_json::json!({ "loop-closure": 1 }));
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
 fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running() {
     let run = Run::of_recording();
     let slow = run.clone().rate(SLOW);
-    let mut running = slow.start();
-    running.await_poses(1);
+    let running = slow.started(1);
     // Nothing can be put in its place.
     fs::create_dir(run.out().join("summary.json")).unwrap();
     ask(&run, &["down"]).failed_with(&["results are not written"]);
     assert!(!running.finish().status.success());
     fs::remove_dir(run.out().join("summary.json")).unwrap();
-    let mut running = slow.start();
-    running.await_poses(2);
+    let running = slow.started(2);
     running.kill_supervisor();
     ask(&run, &["down"]).refused_with(&["no run", "and was killed"]);
     let other = Run::of_recording().rate(SLOW);
     let going = other.start();
     await_status(&other, "poses", |it| it["poses"].as_u64() >= Some(1));
-    let mut ps = gyre();
-    ps.args(["ps", "--json"]);
-    let listed = Ended::of(ps).stdout;
+    let listed = finished!["ps", "--json"].stdout;
     assert!(!listed.contains(run.out().to_str().unwrap()), "{listed}");
     ask(&other, &["down"]).succeeded();
     going.finish();
@@ -254,27 +196,23 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
 }
 
 #[test]
-fn a_stage_that_hangs_is_restarted_alone() {
-    let run = Run::of_recording()
-        .rate(MODERATE)
-        // So long that a look at the runs of all tests, on a busy machine, falls into it.
-        .set("run.stall_timeout_s=8");
-    let mut running = run.start();
-    running.await_poses(THIRD / 2);
-    let stages = running.await_stages();
-    send(stages["rotation-search"], Signal::STOP);
-    // It is silent, or working without end, if it was stopped in its work.
-    await_status(&run, "hanging", |it| {
-        let stage = process(it, "rotation-search");
-        let hangs = stage["activity"] == "silent" || stage["activity_s"].as_f64() > Some(0.5);
-        hangs && process(it, "masking")["activity"] == "waiting"
-    });
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("rotation-search hangs"), "{ended:?}");
-    let restarts = run.summary()["restarts"].clone();
-    assert_eq!(restarts, serde_json::json!({ "rotation-search": 1 }));
-    assert_eq!(run.odometry(), undisturbed());
+fn a_stage_or_a_follower_that_hangs_is_restarted_alone() {
+    for name in ["rotation-search", "loop-closure"] {
+        let run = Run::of_recording()
+            .rate("1")
+            .set("slam.kind=graph")
+            .set("run.stall_timeout_s=2");
+        let running = run.started(4);
+        let status = await_status(&run, "followers", |it| {
+            process(it, "loop-closure")["activity"] == "waiting"
+        });
+        let pid = process(&status, name)["pid"].as_u64().unwrap() as Pid;
+        send(pid, Signal::STOP);
+        running.finish().succeeded().says(&format!("{name} hangs"));
+        let restarts = run.summary()["restarts"].clone();
+        assert_eq!(restarts, serde_json::json!({ name: 1 }));
+        assert_eq!(run.odometry(), undisturbed());
+    }
 }
 
 #[test]
@@ -284,20 +222,16 @@ fn logs_of_a_run_are_lines_of_the_process_that_is_asked_for() {
     recording::truncate(&images[3], 1000);
     let run = Run::of_recording_named(copy.path().to_str().unwrap());
     run.finish();
-    let lines = ask(&run, &["logs", "radar-replay"]);
-    let said = &lines.succeeded().stdout;
-    assert!(said.contains("WARN radar-replay: skipped"), "{said}");
+    ask(&run, &["logs", "radar-replay"])
+        .succeeded()
+        .prints("WARN radar-replay: skipped");
     assert_eq!(ask(&run, &["logs", "refinement"]).succeeded().stdout, "");
     ask(&run, &["logs", "steering"]).refused_with(&["steering", "refinement"]);
 }
 
 #[test]
 fn top_shows_the_processes_of_a_run_in_a_terminal() {
-    let version = Command::new("tmux").arg("-V").output();
-    if !version.is_ok_and(|it| it.status.success()) {
-        println!("skipped: there is no tmux");
-        return;
-    }
+    only_if!(can(&["tmux", "-V"]));
     let (run, running) = started();
     let socket = run.folder().join("tmux");
     let tmux = |arguments: &[&str]| {
@@ -327,8 +261,7 @@ fn top_shows_the_processes_of_a_run_in_a_terminal() {
     }
     let text = ask(&run, &["top", "--once", "--every", "0.2"]);
     assert!(text.succeeded().stdout.contains("rotation-search"));
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 /// Reads notifications from a socket, as systemd does, until `STOPPING=1`.
@@ -349,7 +282,7 @@ fn systemd_is_notified_when_a_run_is_ready_alive_and_stopping() {
     let socket = UnixDatagram::bind(&path).unwrap();
     let limit = Some(Duration::from_secs(60));
     socket.set_read_timeout(limit).unwrap();
-    let run = Run::of_recording().rate(MODERATE);
+    let run = Run::of_recording().rate("3");
     let mut command = run.command();
     command.env("NOTIFY_SOCKET", &path);
     command.env("WATCHDOG_USEC", "400000");

@@ -48,13 +48,3 @@ fn a_configuration_of_the_program_is_run_by_its_name_on_a_recording() {
         .refused_with(&["`oxfrod` is no file or folder", "did you mean `oxford`?"]);
     at(folder.path(), &["evaluate", "out/stop-and-go", data]).succeeded();
 }
-
-#[test]
-fn a_copy_of_a_configuration_finds_the_files_of_the_program() {
-    let folder = tempfile::tempdir().unwrap();
-    let printed = at(folder.path(), &["config", "stop-and-go"]);
-    fs::write(folder.path().join("mine.toml"), &printed.succeeded().stdout).unwrap();
-    let simulate = ["simulate", "mine.toml", "--scans", "2", "--out", "drive"];
-    at(folder.path(), &simulate).succeeded();
-    assert!(folder.path().join("drive").is_dir());
-}

@@ -2,7 +2,7 @@
 
 use std::{fs, os::unix::fs::FileTypeExt, path::Path, process::Command, thread};
 
-use crate::common::{Ended, Run, folder, gyre};
+use crate::common::{Ended, Run, finished, folder};
 
 const NAMES: &str = "config.toml map.png fixes.csv masks.png calibration.toml trajectory.svg report.json results.csv dataset.toml shadow.csv";
 const REFUSALS: &str = "was not written by|has the files of|fills a folder|exist|is not a page of";
@@ -32,9 +32,7 @@ fn commands(run: &Run, files: &Path) -> Vec<String> {
 const NEW_FROM: usize = 11; // The places of the commands from here on must be new.
 
 fn execute(command: &str, place: &Path) -> Ended {
-    let mut process = gyre();
-    process.args(command.split(' ')).arg(place);
-    Ended::of(process)
+    finished![; command.split(' '); [place]]
 }
 
 fn expect(is_refused: bool, command: &str, place: &Path) {

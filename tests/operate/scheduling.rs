@@ -2,7 +2,7 @@
 
 use std::{fs, io::Read};
 
-use crate::common::{OtherUser, Pid, Run, leftovers, recording, undisturbed};
+use crate::common::{OtherUser, Pid, Run, leftovers, processes, recording, undisturbed};
 
 /// The recording's six seconds in two.
 const MODERATE: &str = "3";
@@ -11,9 +11,7 @@ const WAKE_LIMIT: &str = "/dev/cpu_dma_latency";
 
 /// The niceness of a process and the processors that it may use.
 fn priority(pid: Pid) -> (i32, String) {
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    let (_, fields) = stat.rsplit_once(") ").unwrap();
-    let nice = fields.split(' ').nth(16).unwrap();
+    let nice = &processes::stat(pid).unwrap()[16];
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
     let mut lines = status.lines();
     let cpus = lines.find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
@@ -35,8 +33,7 @@ fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restar
     let again = running.await_other_stage("masking", stages["masking"]);
     running.await_poses(recording::SCANS / 3);
     assert_eq!(priority(again), (5, "0".to_owned()));
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let refused = Run::of_recording().set("run.scheduling.nice=-21").finish();
     refused.refused_with(&["run", "nice", "-20 to 19"]);
     let processor = Run::of_recording().set("run.scheduling.cpus=[1000]");
@@ -59,15 +56,13 @@ fn processors_wake_within_the_limit_of_the_configuration_as_long_as_the_run_live
         return;
     };
     let run = Run::of_recording().rate(MODERATE).set("run.cpu_wake_us=7");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     assert_eq!(wake_limit(), Some(7));
     running.finish().succeeded();
     assert_eq!(wake_limit(), Some(before));
     assert_eq!(run.odometry(), undisturbed());
     let killed = Run::of_recording().rate(MODERATE).set("run.cpu_wake_us=7");
-    let mut running = killed.start();
-    running.await_poses(2);
+    let running = killed.started(2);
     running.kill_supervisor();
     leftovers::remove(killed.out());
     assert_eq!(wake_limit(), Some(before));
@@ -75,8 +70,7 @@ fn processors_wake_within_the_limit_of_the_configuration_as_long_as_the_run_live
 
 #[test]
 fn a_run_that_may_not_keep_processors_awake_does_not_start() {
-    let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n")
-        .set("run.cpu_wake_us=0");
+    let run = Run::simulated(8).set("run.cpu_wake_us=0");
     let Some(user) = OtherUser::new(run.folder()) else {
         return;
     };

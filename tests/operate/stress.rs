@@ -4,18 +4,17 @@ use std::{
     fs,
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::{Child, Output, Stdio},
-    thread,
+    process::Stdio,
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
 use gyre_client::{Usage, control::Control, memory};
-use gyre_simulator::{GyroProfile, Profile, SimulationConfig};
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{Ended, assert_nothing_left, folder, gyre, recording, send};
+use crate::common::{Ended, assert_nothing_left, folder, gyre, recording, send, wrapped};
 
 /// Time between two scans of the recording, s.
 const PERIOD_S: f64 = 0.25;
@@ -45,21 +44,18 @@ impl Stress {
         self.folder.path().join("out")
     }
 
-    fn run(&self, words: &[&str]) -> Output {
-        finish(self.start(words))
+    fn run(&self, words: &[&str]) -> Ended {
+        self.start(words).join().unwrap()
     }
 
-    fn start(&self, words: &[&str]) -> Child {
+    /// Starts it; its end must come.
+    fn start(&self, words: &[&str]) -> JoinHandle<Ended> {
         let mut command = gyre();
-        command
-            .arg("stress")
-            .arg(self.folder.path().join("small.toml"))
-            .arg("--out")
-            .arg(self.out())
-            .args(words)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        command.spawn().unwrap()
+        command.arg("stress");
+        command.arg(self.folder.path().join("small.toml"));
+        command.arg("--out").arg(self.out()).args(words);
+        let command = wrapped(&["timeout", "120"], &command);
+        thread::spawn(|| Ended::of(command))
     }
 
     /// The folder of the results of a run.
@@ -79,10 +75,9 @@ impl Stress {
 
     /// Asserts that the test was not carried out, and printed these words.
     fn is_not_carried_out(&self, words: &[&str], said: &[&str]) {
-        let output = self.run(words);
-        assert_eq!(output.status.code(), Some(2));
-        let printed = [output.stdout, output.stderr].concat();
-        let printed = String::from_utf8_lossy(&printed);
+        let ended = self.run(words);
+        assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
+        let printed = ended.stdout + &ended.stderr;
         assert!(said.iter().all(|it| printed.contains(it)), "{printed}");
     }
 
@@ -91,29 +86,10 @@ impl Stress {
     }
 }
 
-/// Waits for the end, which must come.
-fn finish(mut stress: Child) -> Output {
-    let since = Instant::now();
-    while stress.try_wait().unwrap().is_none() {
-        if since.elapsed() > LIMIT {
-            stress.kill().unwrap();
-            let said = stress.wait_with_output().unwrap();
-            panic!(
-                "it does not end:\n{}",
-                String::from_utf8_lossy(&said.stderr)
-            );
-        }
-        thread::sleep(Duration::from_millis(10));
-    }
-    let output = stress.wait_with_output().unwrap();
-    println!("{}", String::from_utf8_lossy(&output.stderr));
-    output
-}
-
 /// The standard output of a test that has found a failure.
-fn failed(output: Output) -> String {
-    assert_eq!(output.status.code(), Some(1));
-    String::from_utf8(output.stdout).unwrap()
+fn failed(ended: Ended) -> String {
+    assert_eq!(ended.code(), Some(1), "{}", ended.stderr);
+    ended.stdout
 }
 
 fn number(value: &Value) -> f64 {
@@ -125,7 +101,7 @@ fn a_generous_budget_is_kept_and_an_impossible_one_is_named() {
     let stress = Stress::new();
     let steady = ["--scenario", "steady", "--duration", "3"];
     let kept = [&steady[..], &["--set", "budget.max_ms=60000"]].concat();
-    assert_eq!(stress.run(&kept).status.code(), Some(0));
+    stress.run(&kept).succeeded();
     assert!(stress.out().join("config.toml").exists());
     let outcome = stress.outcome();
     assert_eq!(outcome["verdict"], "passed");
@@ -141,28 +117,11 @@ fn a_generous_budget_is_kept_and_an_impossible_one_is_named() {
 }
 
 #[test]
-fn a_source_that_is_stopped_shows_in_sensor_to_pose_although_its_service_time_hides_it() {
-    let stress = Stress::new();
-    let words = ["--scenario", "stopped", "--stage", "radar-replay"];
-    let words = [&words[..], &["--duration", "6"]].concat();
-    assert_eq!(stress.run(&words).status.code(), Some(0));
-    let figures = &stress.outcome()["figures"];
-    assert_eq!(figures["faults"][0]["stage"], "radar-replay");
-    let open = number(&figures["sensor_to_pose"]["max_ms"]);
-    let closed = number(&figures["closed_loop"]["max_ms"]);
-    // The stage is stopped for 1 s. Up to a period passes before the next scan is due.
-    assert!(open >= 1e3 * (1.0 - PERIOD_S), "{open} ms");
-    assert!(closed < 0.7 * open, "{closed} ms of {open} ms");
-    assert!(figures["counts"]["dropped"].as_u64() > Some(0));
-    assert_eq!(figures["counts"]["due"], 24);
-}
-
-#[test]
 fn the_sensors_clock_goes_on_while_its_source_is_dead() {
     let stress = Stress::new();
     let words = ["--scenario", "kills", "--stage", "radar-replay"];
     let words = [&words[..], &["--duration", "6"]].concat();
-    assert_eq!(stress.run(&words).status.code(), Some(0));
+    stress.run(&words).succeeded();
     let figures = &stress.outcome()["figures"];
     let summary = fs::read_to_string(stress.run_out("kills").join("summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
@@ -216,7 +175,7 @@ fn a_stage_behind_a_shell_is_measured_and_stopped_with_all_that_it_has_started()
     );
     let stopped = ["--scenario", "stopped", "--stage", "masking"];
     let words = [&stopped[..], &["--duration", "6", "--set", &command]].concat();
-    assert_eq!(stress.run(&words).status.code(), Some(0));
+    stress.run(&words).succeeded();
     let outcome = stress.outcome();
     assert_eq!(outcome["verdict"], "passed");
     let figures = &outcome["figures"];
@@ -235,8 +194,7 @@ fn stages_that_are_slow_are_not_judged_without_a_limit() {
     let stress = Stress::new();
     let stages = ["--stage", "masking", "--stage", "refinement"];
     let slow = ["--scenario", "slow-stage", "--duration", "2"];
-    let output = stress.run(&[&slow[..], &stages].concat());
-    assert_eq!(output.status.code(), Some(0));
+    stress.run(&[&slow[..], &stages].concat()).succeeded();
     assert_eq!(stress.outcome()["verdict"], "not-judged");
     let run = fs::read_to_string(stress.run_out("slow-stage").join("config.toml")).unwrap();
     assert_eq!(run.matches("delay_ms = 300").count(), 2, "{run}");
@@ -262,7 +220,7 @@ fn what_a_killed_run_has_left_is_not_measured() {
     // Its files in shared memory stay, where the next run has its own.
     let supervisor = Control::of(&out).unwrap().status().unwrap().pid;
     send(supervisor, Signal::KILL);
-    failed(finish(measured));
+    failed(measured.join().unwrap());
     let outcomes = stress.outcomes();
     let [killed, next] = [0, 1].map(|index| &outcomes[index]);
     assert_eq!(killed["verdict"], "failed");
@@ -275,15 +233,9 @@ fn what_a_killed_run_has_left_is_not_measured() {
 
 /// A drive of 15 s with the logs of a gyro and of wheels.
 fn with_gyro_and_wheels() -> PathBuf {
-    let mut config = SimulationConfig {
-        scans: Some(60),
-        ..SimulationConfig::default()
-    };
-    config.sensor.profile = Profile::Cts350xRadiate;
-    config.drive.speed_mps = 8.0;
-    config.gyro.profile = GyroProfile::Asm330lhh;
-    config.wheels.rate_hz = 50.0;
-    recording::of("stressed-gyro-and-wheels", &config)
+    let settings = "scans = 60\nsensor.profile = 'cts350x-radiate'\ndrive.speed_mps = 8.0\n\
+        gyro.profile = 'asm330lhh'\nwheels.rate_hz = 50.0\n";
+    recording::configured("stressed-gyro-and-wheels", settings)
 }
 
 const BOTH: [&str; 4] = ["--set", "gyro.kind=auto", "--set", "wheels.kind=auto"];

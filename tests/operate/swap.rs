@@ -1,8 +1,6 @@
 //! Swaps: another program takes the place of a stage of a running run, or fails to.
 
 use std::{
-    fs,
-    os::unix::fs::PermissionsExt,
     process::{Child, Stdio},
     thread,
     time::{Duration, Instant},
@@ -13,7 +11,7 @@ use serde_json::Value;
 
 use crate::{
     PROGRAM,
-    common::{Ended, Run, STAGES, gyre, undisturbed},
+    common::{Ended, Run, STAGES, gyre, install, undisturbed},
     operate::commands::{ask, process, started, status},
     reach::conformance,
 };
@@ -39,8 +37,7 @@ fn shell_words(words: &[&str]) -> String {
 fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
     // Thirty seconds, since the machine may be busy.
     let run = Run::of_recording().rate("0.2");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     for stage in STAGES {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
         let status = status(&run).unwrap();
@@ -48,8 +45,7 @@ fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
     }
     swap(&run, "masking", &[], &[]).succeeded();
     swap(&run, "rotation-search", &["--cold"], &[]).succeeded();
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let summary = run.summary();
     assert_eq!(summary["swaps"].as_array().unwrap().len(), STAGES.len() + 2);
     assert_eq!(summary["dropped"], 0);
@@ -68,16 +64,14 @@ fn a_program_that_cannot_take_over_changes_nothing() {
     }
     swap(&run, "steering", &[], &["true"]).refused_with(&["steering"]);
     assert_eq!(running.await_stage("masking"), before);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
 fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
     // Twenty seconds, since the machine may be busy.
     let run = Run::of_recording().rate("0.3");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let fails = script(&run, "fails.sh", FAILS);
     let cold = script(&run, "cold.sh", "echo no such mask >&2\nexit 3");
     for (options, program, reason, words) in [
@@ -102,8 +96,7 @@ fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
 /// An executable script.
 fn script(run: &Run, name: &str, text: &str) -> String {
     let path = run.folder().join(name);
-    fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
-    fs::set_permissions(&path, fs::Permissions::from_mode(0o700)).unwrap();
+    install(&path, format!("#!/bin/sh\n{text}\n"));
     path.to_str().unwrap().to_owned()
 }
 
@@ -114,8 +107,7 @@ const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\necho no such mask >&2\n
 fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fails() {
     // A minute, since the machine may be busy.
     let run = Run::of_recording().rate("0.1");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let own = script(&run, "own.sh", &format!("exec {PROGRAM} stage masking"));
     swap(&run, "masking", &[], &[&own]).succeeded();
     let before = process(&status(&run).unwrap(), "masking")["pid"].clone();
@@ -142,21 +134,19 @@ fn a_program_whose_messages_no_stage_can_read_gives_way_and_does_not_end_the_run
         "translation-search died after it",
         "NaN",
     ]);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]
 fn a_swap_without_a_scan_to_try_the_program_says_so_with_a_code_of_its_own() {
     // Nothing comes for a minute after the first scans.
     let run = Run::of_recording().rate("0.01");
-    let mut running = run.start();
-    running.await_poses(1);
+    let running = run.started(1);
     let own = ["nice", PROGRAM, "stage", "rotation-search"];
     let ended = swap(&run, "rotation-search", &[], &own);
     assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
     let reason = "no scan has gone through it";
-    assert!(ended.stderr.contains(reason), "{}", ended.stderr);
+    ended.says(reason);
     ask(&run, &["down"]).succeeded();
     running.end();
 }
@@ -175,8 +165,7 @@ fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
     while !swap(&run, "masking", &[], &own).status.success() {
         assert!(since.elapsed().as_secs() < 10, "the first one stands by");
     }
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 /// A swap command that has been started.
@@ -212,26 +201,10 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
     }
     assert!(since.elapsed().as_secs() < 40, "{:?}", since.elapsed());
     running.signal(Signal::CONT);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     let summary = run.summary();
     assert_eq!(summary["swaps"], Value::Null);
     assert_eq!(summary["restarts"], serde_json::json!({}));
-}
-
-#[test]
-fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
-    // A minute. The swap takes eight seconds, or more on a busy machine.
-    let run = Run::of_recording().rate("0.1").set("run.start_timeout_s=8");
-    let mut running = run.start();
-    running.await_poses(2);
-    let said = said(swapping(&run, &[]));
-    let note = "masking continues as before: waiting for 8 s at most (run.start_timeout_s) for `";
-    assert!(said.contains(note), "{said}");
-    assert!(said.contains("it did not get ready"), "{said}");
-    assert_eq!(status(&run).unwrap()["swap"], Value::Null);
-    ask(&run, &["down"]).succeeded();
-    running.end();
 }
 
 #[test]
@@ -241,8 +214,7 @@ fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
         .rate("0.25")
         .set("run.mode=live")
         .set("source.scans=16");
-    let mut running = run.start();
-    running.await_poses(4);
+    let running = run.started(4);
     for &stage in &STAGES[1..5] {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
     }

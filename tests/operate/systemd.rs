@@ -4,18 +4,15 @@ use std::{fs, path::Path, process::Command};
 
 use crate::{
     PROJECT,
-    common::{folder, gyre},
+    common::{can, folder, gyre},
+    reach::only_if,
 };
 
 const UNIT: &str = "configs/systemd/gyre@.service";
 
 #[test]
 fn systemd_accepts_the_unit() {
-    let has_analyzer = Command::new("systemd-analyze").arg("--version").output();
-    if !has_analyzer.is_ok_and(|it| it.status.success()) {
-        println!("skipped: there is no systemd-analyze");
-        return;
-    }
+    only_if!(can(&["systemd-analyze", "--version"]));
     let place = folder();
     let unit = fs::read_to_string(Path::new(PROJECT).join(UNIT)).unwrap();
     // Its own program is not installed here.

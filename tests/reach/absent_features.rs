@@ -1,21 +1,15 @@
 //! A build without `--features full` prints one sentence: the missing feature, and how to get it.
 
-use crate::common::{Ended, Run, gyre};
+use crate::common::{Run, finished};
 
 const REMEDY: &str = "cargo run --release --locked --features full --";
-
-fn command(arguments: &[&str]) -> Ended {
-    let mut command = gyre();
-    command.args(arguments);
-    Ended::of(command)
-}
 
 #[cfg(not(feature = "link"))]
 #[test]
 fn a_build_without_link_says_how_to_get_it() {
     let endpoint = "tcp/127.0.0.1:7447";
     for (end, option) in [("send", "--listen"), ("receive", "--connect")] {
-        command(&["link", end, "out", option, endpoint]).refused_with(&["zenoh", REMEDY]);
+        finished!["link", end, "out", option, endpoint].refused_with(&["zenoh", REMEDY]);
     }
     for (side, key) in [("robot", "connect"), ("base", "listen")] {
         let run = Run::of_recording().set(&format!("link.side='{side}'"));
@@ -27,7 +21,7 @@ fn a_build_without_link_says_how_to_get_it() {
 #[cfg(not(feature = "ros2"))]
 #[test]
 fn a_build_without_ros2_says_how_to_get_it() {
-    command(&["ros2", "out"]).refused_with(&["ROS 2", REMEDY]);
+    finished!["ros2", "out"].refused_with(&["ROS 2", REMEDY]);
     let run = Run::small().argument("--ros2", "/radar_data/fft_data");
     run.finish().refused_with(&["ROS 2", REMEDY]);
 }

@@ -14,9 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_journal as journal;
-
-use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
+use crate::common::{Ended, Run, finished, gyre, poses_of, recording, undisturbed, wrapped};
 
 const MAX_WAIT: Duration = Duration::from_secs(60);
 /// Time for which the link is cut: longer than the time after which a connection is given up.
@@ -90,8 +88,7 @@ fn a_robot_that_begins_anew_is_given_what_the_base_has() {
     let [base, robot] = sides("masked");
     let robot = robot.rate("2");
     let there = base.start();
-    let mut here = robot.start();
-    here.await_poses(8);
+    let here = robot.started(8);
     here.kill_supervisor();
     robot.option("--fresh").start().finish().succeeded();
     there.finish().succeeded();
@@ -112,9 +109,7 @@ fn a_link_off_this_machine_needs_certificates() {
     plain.finish().refused_with(&["unencrypted", "tls/"]);
     let live = side("base", "scan", "link.listen=['tcp/127.0.0.1:7447']").set("run.mode=live");
     live.finish().refused_with(&["link", "masking sheds load"]);
-    let mut command = gyre();
-    command.args(["link", "send", "out", "--listen", "tcp/0.0.0.0:7447"]);
-    Ended::of(command).refused_with(&["unencrypted"]);
+    finished!["link", "send", "out", "--listen", "tcp/0.0.0.0:7447"].refused_with(&["unencrypted"]);
 }
 
 #[test]
@@ -128,8 +123,7 @@ fn a_robot_that_plays_another_drive_is_refused() {
         let robot = robot.set("link.side='robot'").set("link.cut='motion'");
         robot.set(&format!("link.connect=['{address}']"))
     });
-    let mut here = first.start();
-    here.await_poses(6);
+    let here = first.started(6);
     here.kill_supervisor();
     let ended = second.finish();
     ended.failed_with(&["the base has poses of a different drive", "--fresh"]);
@@ -140,8 +134,7 @@ fn a_robot_that_plays_another_drive_is_refused() {
 #[test]
 fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
     let run = Run::of_recording().rate("1");
-    let mut running = run.start();
-    running.await_poses(6);
+    let running = run.started(6);
     let link = Link::new();
     let seen = run.folder().join("seen");
     let mut send = link.end("send", run.out());
@@ -160,37 +153,33 @@ fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
     let (received_part, _) = received.stderr.split_once("; missed").unwrap();
     assert!(received_part.contains(" scan"), "{}", received.stderr);
     sending.join().unwrap().succeeded();
-    assert_eq!(poses(&seen) + 1, poses(run.out()), "all but the end");
+    assert_eq!(poses_of(&seen) + 1, poses_of(run.out()), "all but the end");
 }
 
 #[test]
 fn a_sender_that_begins_again_is_gone_on_with() {
     let run = Run::of_recording().rate("0.4");
-    let mut running = run.start();
-    running.await_poses(3);
+    let running = run.started(3);
     let link = Link::new();
     let receiving = link.lose_sender(&run);
     let second = link.start("send", run.out());
     running.finish().succeeded();
     let received = receiving.join().unwrap();
-    let said = &received.succeeded().stderr;
     let all = format!("{} pose", recording::SCANS);
-    assert!(said.contains(&all), "{said}");
+    received.succeeded().says(&all);
     second.join().unwrap().succeeded();
 }
 
 #[test]
 fn another_drive_is_not_put_behind_the_one_that_was_received() {
     let run = Run::of_recording().rate("0.4");
-    let mut running = run.start();
-    running.await_poses(3);
+    let running = run.started(3);
     let link = Link::new();
     let receiving = link.lose_sender(&run);
     running.kill_supervisor();
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let later = Run::small().data(other.path()).rate("0.4");
-    let mut running = later.start();
-    running.await_poses(3);
+    let running = later.started(3);
     let mut second = link.end("send", later.out()).spawn().unwrap();
     let received = receiving.join().unwrap();
     received.failed_with(&["the sender plays a different drive now"]);
@@ -202,8 +191,7 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
 fn nobody_connects_without_a_certificate_of_the_authority() {
     let (ours, theirs) = (Certificates::new(), Certificates::new());
     let run = Run::of_recording().rate("0.2");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let address = endpoint().replace("tcp/", "tls/");
     let link = Link { address };
     let sends = |certificates: &Certificates| {
@@ -276,13 +264,9 @@ fn end(process: &mut Child) {
     process.wait().unwrap();
 }
 
-fn poses(out: &Path) -> usize {
-    journal::records(&journal::path(out)).map_or(0, |records| records.into_iter().flatten().count())
-}
-
 fn await_poses(out: &Path) {
     let since = Instant::now();
-    while poses(out) < 2 {
+    while poses_of(out) < 2 {
         assert!(since.elapsed() < MAX_WAIT, "waited in vain for poses");
         thread::sleep(Duration::from_millis(20));
     }

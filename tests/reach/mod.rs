@@ -19,9 +19,7 @@ mod ros2_map;
 #[cfg(feature = "ros2")]
 mod ros2_objects;
 
-use std::process::Command;
-
-use crate::common::{Ended, Run, gyre, odometry};
+use crate::common::{Ended, Run, can, finished, odometry, python};
 
 /// Ends a test that cannot run here.
 macro_rules! only_if {
@@ -46,20 +44,11 @@ pub fn assert_near(own: &str, other: &str, limit_m: f64) {
 
 /// Asks for another program in place of masking in a running run.
 pub fn swap_masking(run: &Run, command: &[&str]) -> Ended {
-    let mut swap = gyre();
-    swap.args(["swap", "masking"]).arg(run.out()).args(command);
-    Ended::of(swap)
+    finished!["swap", "masking", run.out(); command]
 }
 
 /// Returns whether the Python of `GYRE_PYTHON`, else `python3`, has these modules; prints why a
 /// test is skipped.
 pub fn python_has(modules: &str) -> bool {
-    let python = crate::common::python();
-    let mut import = Command::new(&python);
-    let imported = import.args(["-c", &format!("import {modules}")]).output();
-    let has = imported.is_ok_and(|output| output.status.success());
-    if !has {
-        println!("skipped: {python} cannot import {modules}, or GYRE_PYTHON names another");
-    }
-    has
+    can(&[&python(), "-c", &format!("import {modules}")])
 }

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::{
     common::{
-        Ended, Run, folder, gyre,
+        Ended, Run, finished, folder, gyre,
         leftovers::root,
         odometry::columns,
         processes::{child_with, of_run},
@@ -222,8 +222,7 @@ fn killed_it_leaves_no_interpreter_and_no_other_byte() {
         // Either may die.
         send(if pose == 6 { stage } else { interpreter }, Signal::KILL);
     }
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     assert!(of_run(&root(run.out())).is_empty());
 }
 
@@ -234,8 +233,7 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
     let (text, other) = (above(0), above(100));
     let (_folder, file) = file(&text);
     let run = with(Run::of_recording(), "masking", &file).rate("6");
-    let mut running = run.start();
-    running.await_poses(6);
+    let running = run.started(6);
     fs::write(&file, &other).unwrap();
     let stage = child_with(running.pid(), file.to_str().unwrap());
     send(stage.unwrap(), Signal::KILL);
@@ -268,10 +266,7 @@ fn begun_stages_keep_the_contract_and_drive() {
         Ended::of(new).succeeded();
         let project = folder.path().join(format!("my-{stage}"));
         let file = project.join(format!("{function}.py"));
-        let mut conformance = gyre();
-        conformance.args(["conformance", stage, "--scans", "12", "--python"]);
-        conformance.arg(&file);
-        Ended::of(conformance).succeeded();
+        finished!["conformance", stage, "--scans", "12", "--python", &file].succeeded();
         let odometry = with(Run::of_recording(), stage, &file).complete();
         assert_near(undisturbed(), &odometry, 0.5);
     }
@@ -292,10 +287,7 @@ fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
         build.env("CARGO_TARGET_DIR", folder.path().join("target"));
         Ended::of(build).succeeded();
         let program = folder.path().join(format!("target/debug/my-{stage}"));
-        let mut conformance = gyre();
-        conformance.args(["conformance", stage, "--scans", "12", "--command"]);
-        conformance.arg(&program);
-        Ended::of(conformance).succeeded();
+        finished!["conformance", stage, "--scans", "12", "--command", &program].succeeded();
     }
 }
 
@@ -318,8 +310,7 @@ fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
     // The command that has swapped it in has ended, and the stage can be started again.
     let swapped = child_with(running.pid(), "--python");
     send(swapped.unwrap(), Signal::KILL);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
     assert_eq!(run.summary()["restarts"]["masking"], 1);
 }
 
@@ -330,11 +321,10 @@ fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
     let model = Path::new(crate::PROJECT).join(model);
     let run = Run::of_recording().rate("1").masked_by(&model);
     let run = run.set("masking.backend=rten");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
-    let swap = swap_masking(&run, &["--python", file.to_str().unwrap()]);
-    swap.refused_with(&["cannot take over", "one scan at a time"]);
+    swap_masking(&run, &["--python", file.to_str().unwrap()])
+        .refused_with(&["cannot take over", "one scan at a time"]);
     running.signal(Signal::INT);
     running.end();
     // In a run that begins with it, it takes the network's place.

@@ -11,7 +11,7 @@ use rustix::process::Signal;
 
 use crate::{
     PROJECT,
-    common::{Ended, Run, gyre, python, recording, undisturbed},
+    common::{Run, finished, python, recording, undisturbed},
     reach::{assert_near, only_if, python_has, swap_masking},
 };
 
@@ -53,12 +53,9 @@ fn its_messages_are_laid_out_as_those_of_gyre() {
 #[ignore = ".ci/nightly: starts Python often"]
 fn it_keeps_the_contract_of_masking() {
     only_if!(can_start());
-    let mut command = gyre();
     let words =
         "conformance masking --scans 12 --set raster.n=63 --stop-timeout-s 30 --patience-s 60";
-    command.args(words.split(' '));
-    command.args(["--command", &self::command().join(" ")]);
-    Ended::of(command).succeeded();
+    finished![; words.split(' '); ["--command", &command().join(" ")]].succeeded();
 }
 
 #[test]
@@ -73,8 +70,7 @@ fn it_takes_over_in_a_running_pipeline_and_gives_way_again() {
     only_if!(can_start());
     // Twelve seconds: Python starts slowly where the machine is busy.
     let run = Run::of_recording().rate("0.5");
-    let mut running = run.start();
-    running.await_poses(4);
+    let mut running = run.started(4);
     swap_masking(&run, &["--command", &command().join(" ")]).succeeded();
     running.await_poses(12);
     swap_masking(&run, &[]).succeeded();
@@ -93,8 +89,8 @@ fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
     let run = run.set("masking.undo_doppler=true");
     let mut running = run.start();
     let own = running.await_poses(2).await_stage("masking");
-    let swap = swap_masking(&run, &["--command", &command().join(" ")]);
-    swap.refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
+    swap_masking(&run, &["--command", &command().join(" ")])
+        .refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
     assert_eq!(running.await_stage("masking"), own);
     running.signal(Signal::INT);
     running.end();

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::{
-    common::{Ended, Run, gyre, recording},
+    common::{Run, finished, recording},
     reach::{
         only_if,
         ros2::{Program, can_speak, domain, number, received, transforms},
@@ -61,10 +61,7 @@ const OCCUPIED: u8 = 100;
 /// The places of the occupied cells in the map of a run along the radar's axes.
 fn occupied_in_pgm(run: &Run) -> Vec<[f64; 2]> {
     let folder = run.folder().join("map");
-    let mut command = gyre();
-    command.arg("map").arg(run.out()).arg("--out").arg(&folder);
-    command.args(["--format", "pgm"]);
-    Ended::of(command).succeeded();
+    finished!["map", run.out(), "--out", &folder, "--format", "pgm"].succeeded();
     let yaml = std::fs::read_to_string(folder.join("map.yaml")).unwrap();
     let value = |key: &str| yaml.split_once(key).unwrap().1.lines().next().unwrap();
     let cell_m: f64 = value("resolution: ").parse().unwrap();

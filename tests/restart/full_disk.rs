@@ -3,7 +3,7 @@
 
 use std::{fs::File, path::Path, process::Command};
 
-use crate::common::{Ended, Run, gyre, recording, undisturbed};
+use crate::common::{Ended, Run, gyre, recording, undisturbed, with_tmpfs, wrapped};
 
 /// A device on which every write fails as on a full disk.
 fn full() -> File {
@@ -30,8 +30,8 @@ fn command(arguments: &[&str]) -> Command {
 fn results_that_cannot_be_printed_are_a_failure_in_a_sentence() {
     let recording = recording::small().to_str().unwrap();
     for arguments in [&["inspect", recording][..], &["--help"], &["schema"]] {
-        let ended = with_full_output(command(arguments));
-        ended.refused_with(&["cannot write to standard output", "No space left"]);
+        with_full_output(command(arguments))
+            .refused_with(&["cannot write to standard output", "No space left"]);
     }
 }
 
@@ -64,7 +64,7 @@ fn a_full_disk_ends_a_run_with_the_reason_and_a_live_one_when_all_poses_are_comp
         let run = Run::of_recording().set(&format!("run.mode={mode}"));
         let run = run.rate("2");
         std::fs::create_dir(run.out()).unwrap();
-        let Some(command) = run.with_tmpfs(run.out(), "size=64k") else {
+        let Some(command) = with_tmpfs(&run.command(), run.out(), "size=64k") else {
             return;
         };
         let ended = run.start_as(command).finish();
@@ -75,22 +75,18 @@ fn a_full_disk_ends_a_run_with_the_reason_and_a_live_one_when_all_poses_are_comp
 
 #[test]
 fn logs_that_cannot_be_written_do_not_disturb_a_run() {
-    let run = Run::of_recording().rate("6");
-    let mut running = run.start();
-    running.await_poses(3).signal(rustix::process::Signal::INT);
-    running.finish();
+    let run = Run::of_recording();
+    run.interrupt("6", 3);
     let logs = run.out().join("log").read_dir().unwrap();
     let logs = logs.map(|log| log.unwrap().path());
     for log in logs.chain([run.out().join("log.jsonl")]) {
         std::fs::remove_file(&log).unwrap();
         std::os::unix::fs::symlink(Path::new("/dev/full"), &log).unwrap();
     }
-    let mut command = Command::new("env");
-    let own = run.command();
-    command.args(["GYRE_LOG=trace"]);
-    command.arg(own.get_program()).args(own.get_args());
-    let ended = run.start_as(command).finish();
-    ended.succeeded();
-    ended.does_not_say("died");
+    let command = wrapped(&["env", "GYRE_LOG=trace"], &run.command());
+    run.start_as(command)
+        .finish()
+        .succeeded()
+        .does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
 }

@@ -7,14 +7,15 @@ use std::{
 };
 
 use crate::{
-    common::{Run, copy_program, install, recording, undisturbed},
+    common::{
+        Run, copy_program, install,
+        recording::{self, MIDDLE, MODERATE},
+        undisturbed,
+    },
     method::learned_masks::card,
     operate::commands::ask,
 };
 use tempfile::TempDir;
-
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
 
 fn run_of(recording: &TempDir) -> Run {
     Run::of_recording_named(recording.path().to_str().unwrap())
@@ -66,9 +67,7 @@ fn a_stage_restarted_after_a_rebuild_is_still_the_program_that_the_run_was_begun
     running.await_poses(MIDDLE);
     replace(&program, "#!/bin/sh\necho another program >&2\nexit 7\n");
     running.kill("masking").kill("pose-integration");
-    let ended = running.finish();
-    ended.succeeded();
-    ended.does_not_say("another program");
+    running.finish().succeeded().does_not_say("another program");
     assert_eq!(run.odometry(), undisturbed());
 }
 
@@ -146,8 +145,7 @@ fn a_replaced_stage_whose_program_changes_during_the_run_is_not_started_again() 
         .stage_script("masking", "exec '{gyre}' stage masking");
     let script = run.folder().join("masking.sh");
     let whole = fs::read(&script).unwrap();
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
+    let mut running = run.started(MIDDLE);
     replace(&script, "#!/bin/sh\nexit 7\n");
     running.kill("masking");
     running.finish().failed_with(&[
@@ -183,10 +181,8 @@ fn a_stage_of_another_build_is_refused() {
 fn options_that_change_during_a_run_do_not_change_it() {
     let recording = recording::copy(recording::SCANS);
     let run = run_of(&recording).rate(MODERATE);
-    let mut running = run.start();
-    running.await_poses(MIDDLE);
+    let mut running = run.started(MIDDLE);
     change_options(&recording);
     running.kill("radar-replay");
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }

@@ -3,12 +3,12 @@
 
 use std::fs;
 
-use crate::common::{Pid, Run, leftovers, odometry, recording, send, undisturbed};
+use crate::common::{
+    Pid, Run, leftovers, odometry,
+    recording::{MIDDLE, MODERATE},
+    send, undisturbed,
+};
 use rustix::process::Signal;
-
-/// The recording's six seconds in one.
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
 
 /// Stops a process as a replacement may hang that writes no heartbeat.
 fn stop_without_a_heartbeat(run: &Run, name: &str, pid: Pid) {
@@ -28,9 +28,7 @@ fn a_stage_that_hangs_without_a_heartbeat_is_noticed_and_started_again() {
         let mut running = run.start();
         let pid = running.await_poses(3).await_stage(stage);
         stop_without_a_heartbeat(&run, stage, pid);
-        let ended = running.finish();
-        ended.succeeded();
-        ended.says(words);
+        running.finish().succeeded().says(words);
         assert_eq!(run.odometry(), undisturbed());
         assert_eq!(run.summary()["restarts"][stage], 1);
     }
@@ -41,9 +39,7 @@ fn a_stage_that_takes_long_to_start_is_no_stall() {
     let run = Run::of_recording()
         .stage_script("masking", "sleep 4; exec {gyre} stage masking")
         .set("run.stall_timeout_s=1");
-    let ended = run.finish();
-    ended.succeeded();
-    ended.does_not_say("restarted");
+    run.finish().succeeded().does_not_say("restarted");
     assert_eq!(run.odometry(), undisturbed());
 }
 
@@ -86,8 +82,7 @@ fn what_was_computed_before_giving_up_is_kept_and_the_same_command_goes_on() {
         .set("stages.masking.restart.limit=0");
     let mut running = run.start();
     running.await_poses(MIDDLE).kill("masking");
-    let ended = running.finish();
-    ended.failed_with(&[
+    running.finish().failed_with(&[
         "masking died",
         "signal 9",
         "poses are kept",

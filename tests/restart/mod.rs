@@ -6,6 +6,6 @@ mod full_disk;
 mod identity;
 mod killed_stages;
 mod power_failure;
-mod results;
+pub mod results;
 mod shared_memory;
 mod supervisor;

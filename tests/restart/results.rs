@@ -1,14 +1,18 @@
 //! The folder of the results: whole files, one run at a time, nothing lost and nothing of others
 //! removed.
 
-use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
+use std::{fs, os::unix::fs::symlink, path::Path};
 
-use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
+use crate::{
+    common::{
+        Ended, Run, finished,
+        recording::{self, MIDDLE, MODERATE},
+        undisturbed, with_mount,
+    },
+    restart::faults::configurations,
+};
 
-const MODERATE: &str = "6";
-const MIDDLE: usize = recording::SCANS / 3;
-
-fn interrupted() -> Run {
+pub fn interrupted() -> Run {
     let run = Run::of_recording();
     run.interrupt(MODERATE, MIDDLE);
     run
@@ -37,8 +41,7 @@ fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journa
     );
     fs::remove_dir(&csv).unwrap();
     let ended = run.finish();
-    ended.succeeded();
-    ended.says("all 24 poses");
+    ended.succeeded().says("all 24 poses");
     ended.does_not_say("pid");
     assert_eq!(run.odometry(), undisturbed());
     let summary = run.summary();
@@ -143,9 +146,7 @@ fn a_killed_run_is_not_reported_with_the_results_of_the_run_before() {
         let mut running = futile(&run, "exec sleep 60").start();
         running.await_stage("radar-replay");
         running.kill_supervisor();
-        let mut report = gyre();
-        report.arg("report").arg(run.out());
-        Ended::of(report).refused_with(&[reason]);
+        finished!["report", run.out()].refused_with(&[reason]);
     }
 }
 
@@ -233,57 +234,48 @@ fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
 
 #[test]
 fn a_journal_that_is_removed_during_the_run_ends_it_and_is_named() {
-    for replace in [
-        |path: &Path| fs::remove_file(path),
-        |path: &Path| {
-            fs::write(path.with_extension("new"), "")
-                .and_then(|()| fs::rename(path.with_extension("new"), path))
-        },
+    for (slam, name, is_replaced) in [
+        ("none", "poses.journal", false),
+        ("none", "poses.journal", true),
+        ("graph", "keyframes.log", false),
     ] {
-        let run = Run::of_recording().rate(MODERATE);
-        let mut running = run.start();
-        running.await_poses(MIDDLE);
-        let journal = run.out().join("journal/poses.journal");
-        replace(&journal).unwrap();
-        running
-            .finish()
-            .failed_with(&["cannot keep", "poses.journal", "removed or replaced"]);
+        let run = Run::of_recording().set(&format!("slam.kind={slam}"));
+        let running = run.clone().rate(MODERATE).started(MIDDLE);
+        let journal = run.out().join("journal").join(name);
+        fs::remove_file(&journal).unwrap();
+        if is_replaced {
+            fs::write(&journal, "").unwrap();
+        }
+        running.finish().failed_with(&[name, "removed or replaced"]);
         assert!(!run.out().join("journal/complete").exists());
+        if slam == "graph" {
+            run.complete();
+            configurations::slam().assert_undisturbed(&run, name);
+        }
     }
 }
 
 #[test]
 fn a_second_run_with_the_same_results_is_refused_whatever_it_calls_them() {
     let run = Run::of_recording().rate("2");
-    let mut running = run.start();
-    running.await_poses(1);
+    let mut running = run.started(1);
     let [link, mounted] = ["link", "mounted"].map(|name| run.folder().join(name));
     symlink(run.out(), &link).unwrap();
     fs::create_dir(&mounted).unwrap();
     let named = |out: &Path| run.clone().into(out).command();
-    let unshared = |mount: &str, run: &Command| {
-        let script = format!("mount {mount} && exec \"$@\"");
-        wrapped(&["unshare", "--mount", "sh", "-c", &script, "sh"], run)
-    };
     let mut seconds = vec![
         run.command(),
         named(&link),
         named(&run.out().join("log/..")),
     ];
-    let permitted = unshared("-t tmpfs tmpfs /mnt", &Command::new("true")).status();
-    if permitted.is_ok_and(|it| it.success()) {
-        let bound = format!("--bind '{}' '{}'", run.out().display(), mounted.display());
-        seconds.push(unshared(&bound, &named(&mounted)));
-        seconds.push(unshared("-t tmpfs tmpfs /dev/shm", &run.command()));
-    } else {
-        println!("skipped: a mount namespace of its own is not permitted here");
-    }
+    let bound = format!("--bind '{}' '{}'", run.out().display(), mounted.display());
+    seconds.extend(with_mount(&bound, &named(&mounted)));
+    seconds.extend(with_mount("-t tmpfs tmpfs /dev/shm", &run.command()));
     for second in seconds {
         Ended::of(second).refused_with(&["another command is writing to", "--out"]);
     }
     assert!(!running.is_over(), "the first run ended before the second");
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 fn stored() -> Run {

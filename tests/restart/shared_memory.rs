@@ -9,36 +9,25 @@ use std::{
 };
 
 use gyre_transport::run::SHARED_MEMORY;
-use tempfile::TempDir;
 
-use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed};
+use crate::common::{Ended, OtherUser, Run, Running, leftovers, undisturbed, with_tmpfs};
 
-/// A run of a short simulation by another user, with a program and results of its own.
-struct Other {
-    folder: TempDir,
-    user: OtherUser,
-}
+/// A run of a short simulation by another user. `None` if this user cannot become another.
+struct Other(Run, OtherUser);
 
 impl Other {
-    /// `None` if this user cannot become another.
     fn new() -> Option<Self> {
-        let folder = tempfile::tempdir().unwrap();
-        let user = OtherUser::new(folder.path())?;
-        let configuration = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n";
-        fs::write(folder.path().join("test.toml"), configuration).unwrap();
-        Some(Self { folder, user })
+        let run = Run::simulated(8);
+        let user = OtherUser::new(run.folder())?;
+        Some(Self(run, user))
     }
 
     fn run(&self) -> Ended {
-        let mut command = self.user.gyre();
-        command
-            .current_dir(self.folder.path())
-            .args(["run", "test.toml"]);
-        Ended::of(command)
+        Ended::of(self.1.command_of(&self.0))
     }
 
     fn runs(&self) -> PathBuf {
-        Path::new(SHARED_MEMORY).join(format!("gyre-{}", self.user.id))
+        Path::new(SHARED_MEMORY).join(format!("gyre-{}", self.1.id))
     }
 }
 
@@ -92,7 +81,7 @@ const FILL: &str = "cat /dev/zero >> /dev/shm/filled-by-another-program";
 
 /// Starts a run with little shared memory of its own, and waits for its first pose.
 fn start_with_little_memory(run: &Run) -> Option<Running> {
-    let command = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=64m")?;
+    let command = with_tmpfs(&run.command(), Path::new(SHARED_MEMORY), "size=64m")?;
     let mut running = run.start_as(command);
     running.await_poses(1);
     Some(running)
@@ -105,9 +94,7 @@ fn a_run_has_its_memory_before_another_program_fills_the_rest_and_a_restart_with
         return;
     };
     in_shared_memory_of(running.pid(), FILL);
-    let ended = running.finish();
-    ended.succeeded();
-    ended.does_not_say("died");
+    running.finish().succeeded().does_not_say("died");
     assert_eq!(run.odometry(), undisturbed());
 
     let run = Run::of_recording().rate("2");
@@ -128,12 +115,10 @@ fn a_run_has_its_memory_before_another_program_fills_the_rest_and_a_restart_with
 fn two_users_run_at_once() {
     let Some(other) = Other::new() else { return };
     let run = Run::of_recording().rate("6");
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     other.run().succeeded();
     assert!(!other.runs().exists());
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(running.complete(), undisturbed());
 }
 
 #[test]

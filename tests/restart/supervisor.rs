@@ -13,8 +13,7 @@ const SHELL: &str = "sleep 600 &\n{gyre} stage masking";
 #[test]
 fn what_a_stage_has_started_ends_with_a_killed_supervisor() {
     let run = Run::of_recording().rate("2").stage_script("masking", SHELL);
-    let mut running = run.start();
-    running.await_poses(2);
+    let running = run.started(2);
     let before = running.shared_memory_bytes();
     assert!(before > 1_000_000, "{before}");
     running.kill_supervisor();
@@ -27,9 +26,9 @@ fn what_a_stage_has_started_ends_with_a_killed_supervisor() {
 fn a_killed_guardian_is_replaced_and_knows_all_stages() {
     let run = Run::of_recording().rate("2").stage_script("masking", SHELL);
     let mut running = run.start();
-    let guardian = running.await_poses(2).await_guardian(None);
+    let guardian = running.await_poses(2).await_child("guard", None);
     send(guardian, Signal::KILL);
-    running.await_guardian(Some(guardian));
+    running.await_child("guard", Some(guardian));
     running.kill_supervisor();
     leftovers::assert_nothing_left(run.out());
 }
@@ -82,7 +81,6 @@ fn a_stage_for_which_there_is_no_process_is_started_when_there_is_one() {
     thread::sleep(Duration::from_millis(500));
     assert!(!running.stages().contains_key("masking"));
     allow_processes("1000");
-    let ended = running.finish();
-    ended.succeeded();
+    running.finish().succeeded();
     assert_eq!(run.summary()["restarts"]["masking"], 1);
 }

@@ -1,20 +1,21 @@
 //! The followers of a run with SLAM: faults of followers do not affect odometry, and the followers
 //! write the same bytes.
 
-use std::{fs, sync::OnceLock};
+use std::fs;
 
 use gyre_contract::FollowerId;
-use gyre_slam::{Keyframe, Query, RecordReader, records_path};
+use gyre_slam::{Query, RecordReader};
 use rustix::process::Signal;
 
-use crate::common::{
-    Ended, Run, Watch, gyre,
-    recording::{SCANS_AROUND as SCANS, around_a_block},
-    send,
+use crate::{
+    common::{
+        Run, Watch,
+        recording::{MODERATE, SCANS_AROUND as SCANS, around_a_block},
+        send,
+    },
+    restart::faults::configurations::loops,
 };
 
-/// The recording's thirty seconds in five: followers are disturbed while scans come.
-const MODERATE: &str = "6";
 const LOOP_CLOSURE: &str = FollowerId::LoopClosure.name();
 const TRAJECTORY: &str = FollowerId::Trajectory.name();
 
@@ -24,47 +25,6 @@ fn without_slam() -> Run {
 
 fn run() -> Run {
     without_slam().set("slam.kind=graph")
-}
-
-/// The results of a run that must be the same.
-#[derive(PartialEq)]
-pub struct Left {
-    odometry: String,
-    keyframes: Vec<u8>,
-    loops: Vec<u8>,
-    /// `trajectory_slam.tum` and `loops.csv`.
-    pub corrected: [String; 2],
-    map: Vec<u8>,
-}
-
-impl Left {
-    fn by(run: &Run) -> Self {
-        Self {
-            odometry: run.odometry(),
-            keyframes: fs::read(records_path::<Keyframe>(run.out())).unwrap(),
-            loops: fs::read(records_path::<Query>(run.out())).unwrap(),
-            corrected: ["trajectory_slam.tum", "loops.csv"].map(|name| run.result(name)),
-            map: fs::read(run.out().join("map.png")).unwrap(),
-        }
-    }
-}
-
-pub fn undisturbed() -> &'static Left {
-    static LEFT: OnceLock<Left> = OnceLock::new();
-    LEFT.get_or_init(|| {
-        let run = run();
-        run.complete();
-        Left::by(&run)
-    })
-}
-
-fn assert_undisturbed(run: &Run, case: &str) {
-    let (left, undisturbed) = (Left::by(run), undisturbed());
-    assert!(left.odometry == undisturbed.odometry, "{case}: odometry");
-    assert!(left.keyframes == undisturbed.keyframes, "{case}: keyframes");
-    assert!(left.loops == undisturbed.loops, "{case}: loops");
-    assert!(left.corrected == undisturbed.corrected, "{case}: corrected");
-    assert!(left.map == undisturbed.map, "{case}: map");
 }
 
 fn loops_of(run: &Run) -> usize {
@@ -80,14 +40,6 @@ fn restarts(run: &Run, process: &str) -> u64 {
 }
 
 #[test]
-fn a_drive_round_a_block_closes_its_loops_and_has_the_same_odometry() {
-    let (run, plain) = (run(), without_slam());
-    assert_eq!(run.complete(), plain.complete());
-    assert!(loops_of(&run) > 10, "{}", loops_of(&run));
-    assert_eq!(run.summary()["restarts"], plain.summary()["restarts"]);
-}
-
-#[test]
 #[ignore = ".ci/nightly: a drive with loops in several runs"]
 fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_end() {
     let run = run();
@@ -99,7 +51,7 @@ fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_e
         .await_words("waiting for loop-closure: 0 of 0 records");
     send(pid, Signal::CONT);
     running.finish().succeeded();
-    assert_undisturbed(&run, "stopped");
+    loops().assert_undisturbed(&run, "stopped");
     assert_eq!(restarts(&run, LOOP_CLOSURE), 0);
 }
 
@@ -111,15 +63,12 @@ fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
     running
         .await_poses(SCANS)
         .await_words("waiting for loop-closure: ");
-    running.signal(Signal::INT);
-    let ended = running.finish();
-    assert_eq!(ended.code(), Some(130));
-    assert!(slow.odometry() == undisturbed().odometry);
+    running.interrupt();
+    let odometry = without_slam().complete();
+    assert!(slow.odometry() == odometry);
     let run = run().into(slow.out());
-    let ended = run.finish();
-    ended.succeeded();
-    assert!(ended.stderr.contains("resuming after"), "{}", ended.stderr);
-    assert_undisturbed(&run, "resumed");
+    run.finish().succeeded().says("resuming after");
+    loops().assert_undisturbed(&run, "resumed");
 }
 
 #[test]
@@ -145,11 +94,11 @@ fn assert_made_up_for(follower: &str) {
     let died = format!("{follower} died 3 times");
     ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);
     let goes_on = format!("odometry continues without {follower}");
-    assert!(ended.stderr.contains(&goes_on), "{}", ended.stderr);
-    assert!(run.odometry() == undisturbed().odometry);
+    ended.says(&goes_on);
+    assert!(run.odometry() == without_slam().complete());
     fs::remove_file(broken).unwrap();
     run.complete();
-    assert_undisturbed(&run, follower);
+    loops().assert_undisturbed(&run, follower);
 }
 
 #[test]
@@ -159,9 +108,7 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
     let mut running = run.start();
     let given_up = format!("odometry continues without {LOOP_CLOSURE}");
     running.await_words(&given_up).await_poses(2);
-    running.signal(Signal::INT);
-    let ended = running.finish();
-    assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+    running.interrupt();
     assert_eq!(run.summary()["ending"], "interrupted");
 }
 
@@ -174,24 +121,8 @@ fn loops_and_corrections_can_be_watched() {
     running.kill(TRAJECTORY);
     running.finish().succeeded();
     let [loops, corrections] = watches.map(Watch::finish);
+    assert!(loops_of(&run) > 10, "{}", loops_of(&run));
     assert_eq!(loops.seqs, (0..loops_of(&run) as u64).collect::<Vec<_>>());
     assert!(corrections.seqs.is_sorted_by(|a, b| a < b));
     assert!(corrections.seqs.len() > SCANS / 10);
-}
-
-#[test]
-fn a_topic_that_the_run_does_not_have_is_refused_with_its_key() {
-    for (run, topic, key) in [
-        (run(), "fix", "slam.map"),
-        (without_slam(), "loop", "slam.kind"),
-    ] {
-        let run = run.rate(MODERATE);
-        let mut running = run.start();
-        running.await_poses(1);
-        let mut watch = gyre();
-        watch.arg("echo").arg(run.out()).arg(topic);
-        Ended::of(watch).failed_with(&[&format!("has no topic `{topic}`"), key]);
-        running.signal(Signal::INT);
-        running.finish();
-    }
 }

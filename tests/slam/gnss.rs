@@ -1,24 +1,20 @@
 //! GNSS: fixes change no byte of odometry, the corrected trajectory is the same after any kill, and
 //! the map agrees with the fixes.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::PathBuf};
 
 use gyre_datasets::read_trajectory;
 use gyre_geometry::samples::{Geographic, LocalPlane};
 use gyre_radar::Trajectory;
-use gyre_ros2_messages::{Ros2Message, encode, sensor_msgs::NavSatFix, std_msgs::Header};
 use gyre_slam::mapping::{Map, Origin};
-use mcap::{MessageStream, WriteOptions, records::MessageHeader};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::Value;
 
-use super::followers::undisturbed;
 use crate::{
-    common::{Ended, Run, gyre, recording::around_a_block},
+    common::{
+        Run, finished,
+        recording::{around_a_block, linked},
+    },
     live::gnss::assert_replays,
     observers::record::{WINDOW, recorded},
 };
@@ -38,82 +34,38 @@ fn truth() -> Trajectory {
     read_trajectory(&around_a_block().join("ground_truth.tum")).unwrap()
 }
 
-/// The stamps and places of a receiver at 5 Hz whose clock is late by this, with one without a fix
-/// and a reflection.
-fn fixes(delay_s: f64) -> Vec<(i64, Geographic)> {
+/// The log of a receiver at 5 Hz, with one line without a fix and a reflection.
+pub fn log() -> String {
     let (truth, mut random) = (truth(), StdRng::seed_from_u64(7));
     let plane = LocalPlane::new(PLACE, 0.0);
     let (first_ns, last_ns) = truth.span_ns().unwrap();
     let (sin, cos) = TURNED_RAD.sin_cos();
-    let stamps = (first_ns..last_ns).step_by(200_000_000).enumerate();
-    let fix = |(k, stamp_ns): (usize, i64)| {
-        let pose = truth.at(stamp_ns).unwrap();
-        let antenna = pose * nalgebra::Point2::from(LEVER_M);
+    let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
+    for (k, stamp_ns) in (first_ns..last_ns).step_by(200_000_000).enumerate() {
+        let antenna = truth.at(stamp_ns).unwrap() * nalgebra::Point2::from(LEVER_M);
         let mut noise = || SIGMA_M * 3f64.sqrt() * random.random_range(-1.0..1.0);
         let reflected = if (60..75).contains(&k) { 20.0 } else { 0.0 };
-        let mut place = plane.place([
+        let place = plane.place([
             cos * antenna.x - sin * antenna.y + noise() + reflected,
             sin * antenna.x + cos * antenna.y + noise(),
         ]);
-        if k == 3 {
-            place = Geographic {
-                latitude_deg: 0.0,
-                longitude_deg: 0.0,
-            };
-        }
-        (stamp_ns + (delay_s * 1e9) as i64, place)
-    };
-    stamps.map(fix).collect()
-}
-
-pub fn log(delay_s: f64) -> String {
-    let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
-    for (stamp_ns, place) in fixes(delay_s) {
-        let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
+        let [latitude, longitude] = match k {
+            3 => [0.0, 0.0],
+            _ => [place.latitude_deg, place.longitude_deg],
+        };
         text += &format!("{stamp_ns},{latitude},{longitude},{SIGMA_M}\n");
     }
     text
-}
-
-fn with_fixes(of: &Path, to: &Path) {
-    let (bytes, file) = (fs::read(of).unwrap(), fs::File::create(to).unwrap());
-    let mut bag = WriteOptions::new().profile("ros2").create(file).unwrap();
-    for message in MessageStream::new(&bytes).unwrap() {
-        bag.write(&message.unwrap()).unwrap();
-    }
-    let definition = NavSatFix::DEFINITION;
-    let (name, text) = (definition.type_name(), definition.text());
-    let schema = bag.add_schema(&name, "ros2msg", text.as_bytes()).unwrap();
-    let channel = bag.add_channel(schema, "/fix", "cdr", &BTreeMap::new());
-    let channel_id = channel.unwrap();
-    let mut fix = NavSatFix {
-        position_covariance_type: 2,
-        ..NavSatFix::default()
-    };
-    (fix.position_covariance[0], fix.position_covariance[4]) = (SIGMA_M.powi(2), SIGMA_M.powi(2));
-    for (stamp_ns, place) in fixes(0.0) {
-        fix.header = Header::new(stamp_ns, "gnss");
-        (fix.latitude, fix.longitude) = (place.latitude_deg, place.longitude_deg);
-        let header = MessageHeader {
-            channel_id,
-            sequence: 0,
-            log_time: stamp_ns as u64,
-            publish_time: stamp_ns as u64,
-        };
-        let bytes = encode(&fix).unwrap();
-        bag.write_to_known_channel(&header, &bytes).unwrap();
-    }
-    bag.finish().unwrap();
 }
 
 fn without() -> Run {
     Run::small().data(around_a_block()).set("slam.kind=graph")
 }
 
-pub fn run(delay_s: f64) -> Run {
+pub fn run() -> Run {
     let run = without();
     let file = run.folder().join("gnss.csv");
-    fs::write(&file, log(delay_s)).unwrap();
+    fs::write(&file, log()).unwrap();
     with_antenna(run.set("gnss.kind=log")).set(&format!("gnss.file={}", file.display()))
 }
 
@@ -162,15 +114,13 @@ fn apart(a: &Origin, b: &Origin) -> (f64, f64) {
 
 fn draw(run: &Run) -> PathBuf {
     let map = run.folder().join("map");
-    let mut command = gyre();
-    command.arg("map").arg(run.out()).arg("--out").arg(&map);
-    Ended::of(command).succeeded();
+    finished!["map", run.out(), "--out", &map].succeeded();
     map
 }
 
 #[test]
 fn odometry_is_the_same_and_the_map_lies_where_the_fixes_say() {
-    let (run, without) = (run(0.0), without());
+    let (run, without) = (run(), without());
     assert_eq!(run.complete(), without.complete());
     let gnss = &run.summary()["gnss"];
     assert_eq!(gnss["faults"]["zero"], 1, "{gnss}");
@@ -189,58 +139,12 @@ fn odometry_is_the_same_and_the_map_lies_where_the_fixes_say() {
 }
 
 #[test]
-fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let [beside, within] = ["beside", "within"].map(|name| folder.path().join(name));
-    for folder in [&beside, &within] {
-        fs::create_dir(folder).unwrap();
-    }
-    let [beside, within] = [beside, within].map(|folder| folder.join("drive.mcap"));
-    let mut export = gyre();
-    export.arg("export").arg(around_a_block());
-    export.arg("--mcap").arg(&beside);
-    Ended::of(export).succeeded();
-    with_fixes(&beside, &within);
-    let of = |bag: &Path| {
-        let run = Run::small().data(bag).set("slam.kind=graph");
-        with_antenna(run.set("gnss.kind=auto"))
-    };
-    let without = of(&beside).finish();
-    without.refused_with(&["has no messages of sensor_msgs/msg/NavSatFix, and no log"]);
-    fs::write(beside.with_file_name("gnss.csv"), log(0.0)).unwrap();
-    let [of_log, of_bag] = [&beside, &within].map(|bag| recorded(&of(bag).set(WINDOW)));
-    assert_eq!(of_bag.complete(), of_log.complete());
-    assert_eq!(left(&of_bag), left(&of_log));
-    assert_replays(&of_log);
-    assert_replays(&of_bag);
-    let gnss = &of_bag.summary()["gnss"];
-    assert_eq!(gnss["topic"], "/fix", "{gnss}");
-    assert_eq!(gnss["faults"]["zero"], 1, "{gnss}");
-    assert!(gnss["used"].as_u64().unwrap() > 60, "{gnss}");
-    let named = of(&within).set("gnss.topic='/gps/fix'");
-    named
-        .finish()
-        .refused_with(&["topic /gps/fix", "but on: /fix"]);
-    let mut inspect = gyre();
-    inspect.arg("inspect").arg(&within);
-    let inspected = Ended::of(inspect);
-    inspected.succeeded();
-    assert!(
-        inspected.stdout.contains("gnss          /fix: "),
-        "{}",
-        inspected.stdout
-    );
-}
-
-#[test]
-#[ignore = ".ci/nightly: a drive with loops in several runs"]
-fn a_clock_that_is_wrong_is_refused_and_told() {
-    let run = run(6.0);
-    run.finish()
-        .failed_with(&["the fixes of GNSS are not used", "gnss.delay_s"]);
-    let [corrected, _] = &undisturbed().corrected;
-    assert_eq!(&run.result("trajectory_slam.tum"), corrected);
-    let gnss = &run.summary()["gnss"];
-    assert_eq!(gnss["used"], 0, "{gnss}");
-    assert!(gnss.get("origin").is_none(), "{gnss}");
+fn a_log_beside_the_scans_is_used_and_kept_beside_their_recording() {
+    let drive = linked(around_a_block(), |_| true);
+    fs::write(drive.path().join("gnss.csv"), log()).unwrap();
+    let run = Run::small().data(drive.path()).set("slam.kind=graph");
+    let run = recorded(&with_antenna(run.set("gnss.kind=auto")).set(WINDOW));
+    run.complete();
+    assert!(run.summary()["gnss"]["used"].as_u64() > Some(60));
+    assert_replays(&run);
 }

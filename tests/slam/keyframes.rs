@@ -1,34 +1,18 @@
 //! The log of keyframes of a run with SLAM: odometry is the same with it, and it is the same bytes
 //! whatever is killed.
 
-use std::{fs, sync::OnceLock};
+use std::fs;
 
 use gyre_journal as journal;
 use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 
-use crate::common::{Run, recording, undisturbed};
+use crate::{
+    common::{Run, recording, undisturbed},
+    restart::faults::configurations::slam,
+};
 
 fn run() -> Run {
     Run::of_recording().set("slam.kind=graph")
-}
-
-/// The log of keyframes when nothing disturbs the run.
-fn undisturbed_log() -> &'static [u8] {
-    static LOG: OnceLock<Vec<u8>> = OnceLock::new();
-    LOG.get_or_init(|| {
-        let run = run();
-        run.complete();
-        log_of(&run)
-    })
-}
-
-fn log_of(run: &Run) -> Vec<u8> {
-    fs::read(records_path::<Keyframe>(run.out())).unwrap()
-}
-
-fn require_undisturbed(run: &Run, case: &str) {
-    assert_eq!(run.odometry(), undisturbed(), "{case}");
-    assert!(log_of(run) == undisturbed_log(), "{case}: other keyframes");
 }
 
 #[test]
@@ -59,7 +43,7 @@ fn keyframes_are_the_same_bytes_with_one_scan_in_flight_and_without_places_for_o
     for setting in ["run.window=1", "run.observers=0"] {
         let run = run().set(setting);
         run.complete();
-        require_undisturbed(&run, setting);
+        slam().assert_undisturbed(&run, setting);
     }
 }
 
@@ -85,8 +69,7 @@ fn a_run_without_slam_logs_no_keyframes_and_removes_those_of_an_earlier_run() {
 fn a_keyframe_without_its_pose_is_cut_off_and_poses_without_their_keyframe_are_computed_again() {
     for lost in ["pose", "keyframe"] {
         let run = run().rate("6");
-        let mut running = run.start();
-        running.await_poses(recording::SCANS / 2);
+        let running = run.started(recording::SCANS / 2);
         running.kill_supervisor();
         if lost == "pose" {
             let (poses, last) = (poses_of(&run), last_keyframe(&run));
@@ -97,7 +80,7 @@ fn a_keyframe_without_its_pose_is_cut_off_and_poses_without_their_keyframe_are_c
             log.cut(log.len() - 1).unwrap();
         }
         run.complete();
-        require_undisturbed(&run, lost);
+        slam().assert_undisturbed(&run, lost);
     }
 }
 
@@ -109,20 +92,6 @@ fn last_keyframe(run: &Run) -> u64 {
     let mut keyframes = RecordReader::<Keyframe>::open(run.out()).unwrap();
     let last = keyframes.len() - 1;
     keyframes.read(last).unwrap().seq
-}
-
-#[test]
-fn keyframes_that_are_removed_during_the_run_end_it_in_a_sentence() {
-    let run = run().rate("6");
-    let mut running = run.start();
-    running.await_poses(recording::SCANS / 3);
-    fs::remove_file(records_path::<Keyframe>(run.out())).unwrap();
-    running
-        .finish()
-        .failed_with(&["keyframes.log", "removed or replaced", "poses are kept"]);
-    assert!(!run.out().join("journal/complete").exists());
-    run.complete();
-    require_undisturbed(&run, "removed keyframes");
 }
 
 /// The run has ended, and its results are still to be written.

@@ -5,7 +5,10 @@ use std::{process::Command, sync::Arc};
 use gyre_geometry::xy_yaw;
 use gyre_slam::estimation::G2o;
 
-use crate::common::{Ended, Run, Shared, python};
+use crate::{
+    common::{Ended, Run, Shared, python},
+    reach::{only_if, python_has},
+};
 
 const GTSAM: &str = "import gtsam, sys
 graph, poses = gtsam.readG2o(sys.argv[1], False)
@@ -55,14 +58,7 @@ fn a_drive_that_comes_back_is_corrected_by_loops() {
 
 #[test]
 fn gtsam_reads_all_of_a_graph() {
-    let can = Command::new(python()).args(["-c", "import gtsam"]).output();
-    if !can.is_ok_and(|output| output.status.success()) {
-        println!(
-            "skipped: {} has no package gtsam, or GYRE_PYTHON names another",
-            python()
-        );
-        return;
-    }
+    only_if!(python_has("gtsam"));
     let run = corrected();
     let mut command = Command::new(python());
     command.args(["-c", GTSAM]).arg(run.out().join("graph.g2o"));

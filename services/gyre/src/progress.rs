@@ -101,9 +101,8 @@ mod tests {
     fn poses_that_were_not_seen_are_no_dropped_scans() {
         let mut progress = Progress::new(Some(100), 0, &"");
         let pose = |seq, published| Item {
-            seq,
             published,
-            ..Item::default()
+            ..Item::numbered(seq)
         };
         assert!(progress.message(&pose(0, 0)).ends_with("dropped 0"));
         assert!(progress.message(&pose(7, 7)).ends_with("dropped 0"));

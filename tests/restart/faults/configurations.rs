@@ -9,7 +9,6 @@ use std::{
 };
 
 use gyre_contract::FollowerId;
-use gyre_simulator::{GyroProfile, OutputFormat, Profile, SimulationConfig};
 use serde_json::Value;
 
 use crate::{
@@ -29,6 +28,7 @@ const CORRECTED: &[&str] = &[
     "trajectory_slam.tum",
     "loops.csv",
     "graph.g2o",
+    "map.png",
     "journal/keyframes.log",
     "journal/loops.log",
 ];
@@ -130,6 +130,13 @@ impl Configuration {
             .clone()
     }
 
+    /// Asserts that the results of a run are those of the undisturbed one.
+    pub fn assert_undisturbed(&self, run: &Run, case: &str) {
+        let undisturbed = self.undisturbed();
+        let difference = undisturbed.results.difference(&self.results(run));
+        assert_eq!(difference, None, "{case}");
+    }
+
     fn run_undisturbed(&self) -> Undisturbed {
         let run = self.run_of(&(self.recording)(), "max");
         run.complete();
@@ -223,7 +230,7 @@ configurations! {
     }
     /// The same with the fixes of a GNSS receiver.
     gnss: loops() => {
-        run: |_| gnss::run(0.0),
+        run: |_| gnss::run(),
         stateful: TRAJECTORY,
         figures: &["/gnss/used", "/gnss/refused", "/gnss/faults", "/gnss/origin"],
         shows: &[("/gnss/used", 60.0)],
@@ -362,22 +369,13 @@ const WHEELS_LATE_S: f64 = 0.2;
 /// A recording as RADIATE has them, with the log of a gyro whose clock is late and whose host
 /// stalls and loses samples, and with the log of wheels, which slip. The radar goes blind.
 fn with_logs() -> PathBuf {
-    let mut config = SimulationConfig {
-        scans: Some(recording::SCANS),
-        ..SimulationConfig::default()
-    };
-    config.sensor.profile = Profile::Cts350xRadiate;
-    config.output.format = Some(OutputFormat::Radiate);
-    config.drive.speed_mps = 5.0;
-    config.sensor.lost_azimuths = true;
-    config.gyro.profile = GyroProfile::Asm330lhh;
-    config.gyro.delay_s = LATE_S;
-    config.gyro.faults = true;
-    config.wheels.rate_hz = 20.0;
-    config.wheels.delay_s = WHEELS_LATE_S;
-    config.wheels.faults = true;
-    config.blind_s = Some([2.5, 4.5]);
-    recording::of("gyro-and-wheels", &config)
+    let gyro = format!("{{ profile = 'asm330lhh', delay_s = {LATE_S}, faults = true }}");
+    let wheels = format!("{{ rate_hz = 20.0, delay_s = {WHEELS_LATE_S}, faults = true }}");
+    let settings = format!(
+        "{}sensor.lost_azimuths = true\nblind_s = [2.5, 4.5]\ngyro = {gyro}\nwheels = {wheels}\n",
+        recording::RADIATE
+    );
+    recording::configured("gyro-and-wheels", &settings)
 }
 
 pub fn with_gyro() -> Run {
@@ -387,15 +385,9 @@ pub fn with_gyro() -> Run {
 
 /// A recording of a radar whose chirps alternate, in a tunnel from the third second on.
 fn in_a_tunnel() -> PathBuf {
-    let mut config = SimulationConfig {
-        scans: Some(recording::SCANS),
-        ..SimulationConfig::default()
-    };
-    config.sensor.profile = Profile::Ras6;
-    config.output.format = Some(OutputFormat::Boreas);
-    config.drive.speed_mps = 8.0;
-    config.tunnel_m = Some([24.0, 100.0]);
-    recording::of("chirps-alternate", &config)
+    let settings = "scans = 24\nsensor.profile = 'ras6'\noutput.format = 'boreas'\n\
+        drive.speed_mps = 8.0\ntunnel_m = [24.0, 100.0]\n";
+    recording::configured("chirps-alternate", settings)
 }
 
 /// The run of the same recording without its velocities.

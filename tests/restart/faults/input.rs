@@ -11,7 +11,7 @@ const PERIOD_S: f64 = 0.25;
 
 /// Scans are missing, one long gap among them, during which the watchdog must not lose patience. A
 /// stage is killed besides.
-pub fn gaps(scene: &mut Scene) -> Option<()> {
+pub fn the_recording_has_gaps(scene: &mut Scene) -> Option<()> {
     let scans = scene.configuration.poses;
     let gap = scene.rng.random_range(scans / 6..scans / 3);
     let first = scene.rng.random_range(2..scans - gap - 2);
@@ -39,7 +39,7 @@ pub fn gaps(scene: &mut Scene) -> Option<()> {
 }
 
 /// The images are moved away, and come back soon or only after the end.
-pub fn vanishes(scene: &mut Scene) -> Option<()> {
+pub fn the_recording_vanishes(scene: &mut Scene) -> Option<()> {
     let recording = scene.configuration.copy(|_| true);
     let images = folder_of_images(recording.path());
     let away = recording.path().join("away");

@@ -23,7 +23,7 @@ const STORMS: usize = 4;
 const LIVES: usize = 8;
 
 /// All processes in random order, each at a moment of its own.
-pub fn each(scene: &mut Scene) -> Option<()> {
+pub fn each_process_is_killed(scene: &mut Scene) -> Option<()> {
     let mut names = scene.processes();
     names.shuffle(&mut scene.rng);
     let run = scene.run();
@@ -38,7 +38,7 @@ pub fn each(scene: &mut Scene) -> Option<()> {
 }
 
 /// A process in the first milliseconds of its life, and perhaps its successor too.
-pub fn at_the_start(scene: &mut Scene) -> Option<()> {
+pub fn a_process_is_killed_as_it_starts(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     let name = scene.processes().choose(&mut scene.rng)?.clone();
@@ -73,7 +73,7 @@ fn await_writes(running: &mut Running, path: &Path, writes: u64, limit: Duration
 
 /// A process at a write of a file that its successor continues from: refinement writes two such
 /// files for each of its keyframes.
-pub fn at_a_write(scene: &mut Scene) -> Option<()> {
+pub fn a_process_is_killed_as_it_writes(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     let (integration, closing) = ("pose-integration", FollowerId::LoopClosure.name());
@@ -96,7 +96,7 @@ pub fn at_a_write(scene: &mut Scene) -> Option<()> {
 }
 
 /// The process whose state a restart restores, in many of its lives.
-pub fn again_and_again(scene: &mut Scene) -> Option<()> {
+pub fn a_process_is_killed_again_and_again(scene: &mut Scene) -> Option<()> {
     let name = scene.configuration.stateful;
     let run = scene.run();
     let run = run.set(&format!("stages.{name}.restart.limit=1000"));
@@ -111,7 +111,7 @@ pub fn again_and_again(scene: &mut Scene) -> Option<()> {
 }
 
 /// A process when all poses are there: its death does not take them back.
-pub fn after_the_last_pose(scene: &mut Scene) -> Option<()> {
+pub fn a_process_is_killed_after_the_last_pose(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     let name = scene.processes().choose(&mut scene.rng)?.clone();
@@ -124,7 +124,7 @@ pub fn after_the_last_pose(scene: &mut Scene) -> Option<()> {
 
 /// Most of all processes together, again and again, and now and then the supervisor with them: the
 /// same command continues.
-pub fn storms(scene: &mut Scene) -> Option<()> {
+pub fn processes_are_killed_in_storms(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     for storm in 1..=STORMS {
@@ -147,7 +147,7 @@ pub fn storms(scene: &mut Scene) -> Option<()> {
 }
 
 /// The supervisor, up to five times; its stages follow it.
-pub fn supervisor(scene: &mut Scene) -> Option<()> {
+pub fn the_supervisor_is_killed(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     for _ in 0..scene.rng.random_range(1..=5) {
         let mut running = run.start();
@@ -159,7 +159,7 @@ pub fn supervisor(scene: &mut Scene) -> Option<()> {
 }
 
 /// The supervisor while it writes the results.
-pub fn at_the_results(scene: &mut Scene) -> Option<()> {
+pub fn the_supervisor_is_killed_as_it_writes_results(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     running.await_poses_or_end(1);
@@ -171,7 +171,7 @@ pub fn at_the_results(scene: &mut Scene) -> Option<()> {
 }
 
 /// SIGINT or SIGTERM in the middle. The same command continues.
-pub fn interrupt(scene: &mut Scene) -> Option<()> {
+pub fn the_run_is_interrupted(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     running.await_poses_or_end(scene.moments(1)[0]);
@@ -183,7 +183,7 @@ pub fn interrupt(scene: &mut Scene) -> Option<()> {
 
 /// SIGINT or SIGTERM while the processes start. Before there is anything to remove, the signal
 /// simply ends the process.
-pub fn interrupt_at_the_start(scene: &mut Scene) -> Option<()> {
+pub fn the_run_is_interrupted_as_it_starts(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     for _ in 0..LIVES {
         let running = run.start();

@@ -9,7 +9,7 @@ use super::{scene::Scene, tools::limit};
 use crate::common::{Pid, Run, assert_nothing_left, wrapped};
 
 /// Address space.
-pub fn memory(scene: &mut Scene) -> Option<()> {
+pub fn memory_runs_out(scene: &mut Scene) -> Option<()> {
     // A process without memory or descriptors may hang.
     let run = scene.run().set("run.stall_timeout_s=3");
     let bytes = 10_f64.powf(scene.rng.random_range(7.0..10.0)) as u64;
@@ -27,7 +27,7 @@ fn address_space(pid: Pid) -> Option<u64> {
     Some(kilobytes << 10)
 }
 
-pub fn descriptors(scene: &mut Scene) -> Option<()> {
+pub fn descriptors_run_out(scene: &mut Scene) -> Option<()> {
     let run = scene.run().set("run.stall_timeout_s=3");
     let (few, more) = (scene.rng.random_range(4..160), scene.rng.random_range(0..3));
     let more = |pid: Pid| Some(fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as u64 + more);
@@ -35,7 +35,7 @@ pub fn descriptors(scene: &mut Scene) -> Option<()> {
 }
 
 /// No file may become longer. A signal reports the limit, unless the signal is ignored.
-pub fn file_sizes(scene: &mut Scene) -> Option<()> {
+pub fn files_may_not_grow(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let ignored = if scene.one_in(2) {
         "trap '' XFSZ; "

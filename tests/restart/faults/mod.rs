@@ -32,27 +32,7 @@ type Fault = fn(&mut Scene) -> Option<()>;
 
 /// Faults by name, as the rows have them.
 mod kinds {
-    pub use super::{
-        input::{gaps as the_recording_has_gaps, vanishes as the_recording_vanishes},
-        kills::{
-            after_the_last_pose as a_process_is_killed_after_the_last_pose,
-            again_and_again as a_process_is_killed_again_and_again,
-            at_a_write as a_process_is_killed_as_it_writes,
-            at_the_results as the_supervisor_is_killed_as_it_writes_results,
-            at_the_start as a_process_is_killed_as_it_starts, each as each_process_is_killed,
-            interrupt as the_run_is_interrupted,
-            interrupt_at_the_start as the_run_is_interrupted_as_it_starts,
-            storms as processes_are_killed_in_storms, supervisor as the_supervisor_is_killed,
-        },
-        limits::{
-            descriptors as descriptors_run_out, file_sizes as files_may_not_grow,
-            memory as memory_runs_out,
-        },
-        results::{
-            disk_full as the_disk_is_full, read_only as the_results_are_read_only,
-            vanish as the_results_vanish,
-        },
-    };
+    pub use super::{input::*, kills::*, limits::*, results::*};
 }
 
 /// A test for each fault of each configuration.

@@ -11,9 +11,9 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
     scene::{Scene, assert_one_sentence},
-    tools::{Mount, can_mount},
+    tools::Mount,
 };
-use crate::common::{OtherUser, Run, assert_nothing_left_of};
+use crate::common::{OtherUser, Run, assert_nothing_left_of, can_mount};
 
 /// More than any results have.
 const PLENTY: u64 = 256 << 20;
@@ -30,7 +30,7 @@ fn fill(place: &Path, leave: u64) {
 }
 
 /// The disk is too small, or becomes full in the middle; then there is room again.
-pub fn disk_full(scene: &mut Scene) -> Option<()> {
+pub fn the_disk_is_full(scene: &mut Scene) -> Option<()> {
     if !can_mount() {
         return Some(());
     }
@@ -58,7 +58,7 @@ pub fn disk_full(scene: &mut Scene) -> Option<()> {
 }
 
 /// The folder of the results is mounted read-only, or loses its permissions in the middle.
-pub fn read_only(scene: &mut Scene) -> Option<()> {
+pub fn the_results_are_read_only(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     if !can_mount() {
         return Some(());
@@ -109,7 +109,7 @@ fn permit(folder: &Path, write: bool) {
 }
 
 /// The folder of the results is moved away, and comes back soon, after the end, or never.
-pub fn vanish(scene: &mut Scene) -> Option<()> {
+pub fn the_results_vanish(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();
     running.await_poses_or_end(1);

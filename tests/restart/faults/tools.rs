@@ -8,17 +8,6 @@ use std::{
 
 use crate::common::{Pid, processes::is_alive};
 
-/// Returns whether this user can mount; prints why a fault is skipped.
-pub fn can_mount() -> bool {
-    let can = works(&[
-        "unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/mnt",
-    ]);
-    if !can {
-        println!("skipped: mounting needs root (CAP_SYS_ADMIN)");
-    }
-    can
-}
-
 fn works(command: &[&str]) -> bool {
     let output = Command::new(command[0]).args(&command[1..]).output();
     output.is_ok_and(|output| output.status.success())

@@ -199,10 +199,7 @@ impl Stages {
             keyframes.end()?;
         }
         let end = PoseHeader {
-            item: Item {
-                flags: flag::END,
-                ..item(SCANS)
-            },
+            item: item(SCANS).flagged(flag::END),
             ..PoseHeader::default()
         };
         Ok(self.journal.append(&end)?)

@@ -148,12 +148,8 @@ mod tests {
     fn compute(out: &Out, poses: Range<u64>) {
         let mut journal = Journal::open(&journal::path(out.path())).unwrap();
         for seq in poses {
-            let item = Item {
-                seq,
-                ..Item::default()
-            };
             let pose = PoseHeader {
-                item,
+                item: Item::numbered(seq),
                 ..PoseHeader::default()
             };
             journal.append(&pose).unwrap();

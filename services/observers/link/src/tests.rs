@@ -24,15 +24,8 @@ use crate::{
 
 const MAX_WAIT: Duration = Duration::from_secs(180);
 
-fn item(seq: u64) -> Item {
-    Item {
-        seq,
-        ..Item::default()
-    }
-}
-
 fn add(buffer: &MemoryBuffer, seq: u64) {
-    add_item(buffer, &item(seq));
+    add_item(buffer, &Item::numbered(seq));
 }
 
 fn add_item(buffer: &MemoryBuffer, item: &Item) {
@@ -193,7 +186,7 @@ fn a_receiver_gets_what_takes_the_place_of_messages_that_have_become_void() {
             generation,
             numbered_from,
             flags,
-            ..item(seq)
+            ..Item::numbered(seq)
         };
         add_item(&ends.buffer, &item);
     };
@@ -292,7 +285,7 @@ fn messages_that_take_longer_than_a_lost_request_arrive_each_once() {
     // Some 15 s each.
     for seq in 0..2 {
         buffer.add(&RecordedMessage {
-            header: bytemuck::bytes_of(&item(seq)).to_vec(),
+            header: bytemuck::bytes_of(&Item::numbered(seq)).to_vec(),
             payload: vec![seq as u8; 6_000_000],
         });
     }

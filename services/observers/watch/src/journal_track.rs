@@ -59,10 +59,7 @@ mod tests {
 
     fn pose(seq: u64) -> PoseHeader {
         PoseHeader {
-            item: Item {
-                seq,
-                ..Item::default()
-            },
+            item: Item::numbered(seq),
             ..PoseHeader::default()
         }
     }

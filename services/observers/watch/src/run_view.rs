@@ -330,10 +330,7 @@ mod tests {
     use crate::{frame, pictures};
 
     fn pose(seq: u64) -> PoseHeader {
-        let mut item = Item {
-            seq,
-            ..Item::default()
-        };
+        let mut item = Item::numbered(seq);
         item.hop_mut(StageId::PoseIntegration).finished_ns = clock::now_ns();
         PoseHeader {
             item,

@@ -319,12 +319,11 @@ mod tests {
 
     #[test]
     fn scans_before_the_newest_pose_never_start_a_chain() {
-        let flagged = |item, flags| Item { flags, ..item };
         for (item, newest, precedes) in [
             (scan(30), newest_pose(), true),
             (scan(31), newest_pose(), false),
-            (scan(0), flagged(newest_pose(), flag::BASE), false),
-            (flagged(scan(0), flag::END), newest_pose(), false),
+            (scan(0), newest_pose().flagged(flag::BASE), false),
+            (scan(0).flagged(flag::END), newest_pose(), false),
         ] {
             assert_eq!(Chain::precedes(&item, &newest), precedes, "{item:?}");
         }

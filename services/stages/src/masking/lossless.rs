@@ -119,10 +119,6 @@ fn serves_only_as_previous(
 mod tests {
     use super::*;
 
-    fn scan(seq: u64) -> Item {
-        Item::numbered(seq)
-    }
-
     #[test]
     fn a_restart_begins_with_the_newest_poses_scan_or_the_previous_one_if_masks_take_two() {
         let window = |look_back| Window {
@@ -131,11 +127,16 @@ mod tests {
             ..Window::default()
         };
         let kept = |look_back, published, has_previous| {
-            serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)
+            serves_only_as_previous(
+                &window(look_back),
+                &Item::numbered(published),
+                Some(9),
+                has_previous,
+            )
         };
         assert!(kept(1, 8, false) && !kept(1, 9, false));
         assert!(kept(2, 7, true) && kept(2, 8, false) && !kept(2, 9, true));
-        let first = scan(0).flagged(flag::BREAK);
+        let first = Item::numbered(0).flagged(flag::BREAK);
         assert!(!serves_only_as_previous(&window(2), &first, None, false));
     }
 }

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use gyre_contract::{Item, MotionHeader, PoseHeader, flag};
 use gyre_journal::{self as journal, Journal};
 
-use super::{add, item};
+use super::add;
 use crate::replay_buffer::{
     LogBuffer, MemoryBuffer, Message, MotionBuffer, Next, Place, ReplayBuffer,
 };
@@ -14,7 +14,7 @@ fn message(seq: u64) -> Message {
     Message {
         seq,
         generation: 0,
-        bytes: bytemuck::bytes_of(&item(seq)).into(),
+        bytes: bytemuck::bytes_of(&Item::numbered(seq)).into(),
     }
 }
 
@@ -48,7 +48,7 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
     let out = tempfile::tempdir().unwrap();
     let mut journal = Journal::open(&journal::path(out.path())).unwrap();
     let pose = |seq| PoseHeader {
-        item: item(seq),
+        item: Item::numbered(seq),
         x_m: seq as f64,
         ..PoseHeader::default()
     };
@@ -75,10 +75,7 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
     let found = (motion.seq, motion.bytes.len());
     assert_eq!(found, (7, size_of::<MotionHeader>()));
     let end = PoseHeader {
-        item: Item {
-            flags: flag::END,
-            ..item(40)
-        },
+        item: Item::numbered(40).flagged(flag::END),
         ..PoseHeader::default()
     };
     journal.append(&end).unwrap();

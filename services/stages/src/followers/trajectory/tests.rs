@@ -1,9 +1,6 @@
-use std::{f64::consts::TAU, iter::successors, net::UdpSocket};
+use std::{f64::consts::TAU, iter::successors};
 
-use gyre_geometry::{
-    Pose, Twist, UncertainMotion, pose,
-    samples::{Geographic, GnssFix, GnssKind, LocalPlane},
-};
+use gyre_geometry::{Pose, Twist, UncertainMotion, pose, samples::GnssFix};
 use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
 use nalgebra::{Matrix3, Vector3};
 
@@ -158,20 +155,17 @@ fn what_is_cut_off_the_logs_is_taken_back() {
     assert_eq!(correction.unwrap().keyframes, 81);
 }
 
-/// The poses of the laps as they are, without the error of odometry.
-fn laps(first: Pose) -> impl Iterator<Item = (i64, Pose)> {
-    let step = pose(3.0, 0.0, TAU / 40.0);
-    (0..120).zip(successors(Some(first), move |at| Some(at * step)))
-}
-
+/// The places of the laps as they are, without the error of odometry.
 fn fixes() -> Fixes {
+    let step = pose(3.0, 0.0, TAU / 40.0);
+    let laps = successors(Some(pose(70.0, -20.0, 1.0)), |at| Some(at * step));
     let fix = |(index, at): (i64, Pose)| GnssFix {
         stamp_ns: 7 * index,
         east_m: at.translation.x,
         north_m: at.translation.y,
         sigma_m: 0.1,
     };
-    let fixes = laps(pose(70.0, -20.0, 1.0)).map(fix).collect();
+    let fixes = (0..120).zip(laps).map(fix).collect();
     Fixes::new(fixes, &GnssConfig::default())
 }
 
@@ -191,54 +185,4 @@ fn fixes_correct_as_keyframes_come_and_the_last_correction_is_that_of_the_result
     // Odometry turns by 0.0005 rad too little at each keyframe.
     assert!((turned_rad - 0.06).abs() < 0.02, "{turned_rad}");
     logs.end_and_compare(&mut trajectory);
-}
-
-/// The lines that a live receiver sends of the same fixes.
-fn lines() -> String {
-    let place = Geographic {
-        latitude_deg: 51.75,
-        longitude_deg: -1.26,
-    };
-    let plane = LocalPlane::new(place, 0.0);
-    let line = |(index, at): (i64, Pose)| {
-        let place = plane.place([at.translation.x, at.translation.y]);
-        let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
-        format!("{},{latitude},{longitude},0.1\n", 7 * index)
-    };
-    laps(pose(0.0, 0.0, 1.0)).map(line).collect()
-}
-
-#[test]
-fn fixes_that_arrive_are_logged_and_the_last_correction_is_that_of_the_log() {
-    let mut logs = Logs::new();
-    // Senders take their ports on 127.0.0.1, so that this one stays free.
-    let free = UdpSocket::bind("127.0.0.2:0").unwrap();
-    let address = free.local_addr().unwrap();
-    drop(free);
-    let config = GnssConfig {
-        kind: GnssKind::Udp,
-        listen: address.to_string(),
-        ..GnssConfig::default()
-    };
-    let mut trajectory = logs.trajectory();
-    let live = LiveFixes::open(config.clone(), logs.out.path()).unwrap();
-    trajectory.live_fixes = Some(live);
-    logs.append(50, 0);
-    follow(&mut trajectory);
-    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
-    sender.send_to(lines().as_bytes(), address).unwrap();
-    sender.send_to(b"no fix", address).unwrap();
-    logs.append(120, 120);
-    logs.keyframes.end().unwrap();
-    logs.queries.end().unwrap();
-    let (correction, has_ended) = follow(&mut trajectory);
-    assert!(has_ended);
-    let yaw_rad = correction.unwrap().yaw_rad;
-    assert!((yaw_rad - 0.06).abs() < 0.02, "{yaw_rad}");
-    let log = gyre_recording::gnss_log(&config, Path::new(""), logs.out.path());
-    let log = log.unwrap().unwrap();
-    assert_eq!((log.fixes.len(), log.faults.unreadable), (120, 1));
-    logs.fixes = Fixes::new(log.on_radar(&config), &config);
-    let (restarted, _) = follow(&mut logs.trajectory());
-    assert_eq!(text(restarted), text(correction));
 }

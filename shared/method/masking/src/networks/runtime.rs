@@ -245,6 +245,20 @@ mod tests {
     }
 
     #[test]
+    fn the_data_of_a_user_are_in_no_relative_folder() {
+        let of = |data_home: &str, home: &str| {
+            let folder = data_folder(Some(data_home.into()), Some(home.into()));
+            folder.map(|folder| folder.display().to_string())
+        };
+        for relative in ["", ".", "gyre/.."] {
+            assert_eq!(of(relative, relative), None, "{relative}");
+            let home = of(relative, "/home/a");
+            assert_eq!(home.as_deref(), Some("/home/a/.local/share/gyre"));
+        }
+        assert_eq!(of("/data", "").as_deref(), Some("/data/gyre"));
+    }
+
+    #[test]
     fn the_library_is_found_among_the_packages_of_the_environment_of_the_program() {
         let package = "lib/python3.12/site-packages/onnxruntime/capi/libonnxruntime.so.1.31.1";
         let (environment, library) = folder_with(package);
