@@ -1,6 +1,3 @@
-mod attitude;
-mod clock;
-mod errors;
 pub(crate) mod log;
 pub mod profile;
 #[cfg(test)]

@@ -2,7 +2,10 @@
 use gyre_geometry::samples::Sample;
 use nalgebra::Vector3;
 
-use super::{attitude::MeanMotion, clock::Clock, errors::Errors, log, *};
+use super::{
+    log::{self, Clock, Errors, MeanMotion},
+    *,
+};
 use crate::{config::SimulationConfig, simulator::Simulator};
 
 const RATE_HZ: f64 = 100.0;
