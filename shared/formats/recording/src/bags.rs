@@ -6,9 +6,7 @@
 mod azimuths;
 mod bag;
 mod files;
-mod fixes;
 mod radar;
-mod samples;
 mod scans;
 mod sensors;
 mod spans;
@@ -21,6 +19,6 @@ use crate::{
 };
 
 pub use files::is_bag;
-pub use fixes::fixes;
 pub use scans::{open, reopen};
+pub use sensors::fixes;
 pub use writer::{BagWriter, Kept, Topic};

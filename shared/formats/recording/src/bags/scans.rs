@@ -25,7 +25,7 @@ use crate::bags::{
     azimuths::azimuths,
     bag::{Bag, Key},
     files::{Files, files},
-    fixes, samples,
+    sensors,
     topics::Topics,
 };
 
@@ -202,11 +202,11 @@ impl Dataset for Scans {
         of: SampleKind,
         topic: Option<&str>,
     ) -> Result<Option<Vec<Sample>>, OpenError> {
-        Ok(samples::read(&mut self.bag, &self.path, of, topic)?)
+        Ok(sensors::samples(&mut self.bag, &self.path, of, topic)?)
     }
 
     fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
-        Ok(fixes::read(&mut self.bag, &self.path, topic)?)
+        Ok(sensors::fixes_of(&mut self.bag, &self.path, topic)?)
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
