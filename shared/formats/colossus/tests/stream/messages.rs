@@ -8,47 +8,14 @@ use proptest::prelude::*;
 
 use crate::support::configuration;
 
-/// A message that owns its bytes.
-#[derive(Clone, Debug)]
-pub enum Sent {
-    KeepAlive,
-    Configuration(Configuration),
-    Azimuth([u16; 2], [[u8; 4]; 2], bool, Vec<u8>),
-    Request(Request),
-    Other(u8, Vec<u8>),
-}
-
-impl Sent {
-    pub fn message(&self) -> Message<'_> {
-        match self {
-            Self::KeepAlive => Message::KeepAlive,
-            Self::Configuration(configuration) => Message::Configuration(*configuration),
-            Self::Request(request) => Message::Request(*request),
-            Self::Other(id, payload) => Message::Other { id: *id, payload },
-            Self::Azimuth([sweep_counter, encoder], [seconds, split_seconds], wide, powers) => {
-                Message::Azimuth(Azimuth {
-                    sweep_counter: *sweep_counter,
-                    encoder: *encoder,
-                    seconds: *seconds,
-                    split_seconds: *split_seconds,
-                    powers: match wide {
-                        true => Powers::Sixteen(&powers[..powers.len() / 2 * 2]),
-                        false => Powers::Eight(powers),
-                    },
-                })
-            }
-        }
-    }
-
-    pub fn write(&self, out: &mut Vec<u8>) {
-        match self.message() {
-            Message::KeepAlive => write_keep_alive(out),
-            Message::Configuration(configuration) => write_configuration(out, &configuration),
-            Message::Azimuth(azimuth) => write_azimuth(out, &azimuth),
-            Message::Request(request) => write_request(out, request),
-            Message::Other { id, payload } => write_other(out, id, payload),
-            other => panic!("{other:?} is no radar's that is played"),
-        }
+pub fn write(message: &Message<'_>, out: &mut Vec<u8>) {
+    match message {
+        Message::KeepAlive => write_keep_alive(out),
+        Message::Configuration(configuration) => write_configuration(out, configuration),
+        Message::Azimuth(azimuth) => write_azimuth(out, azimuth),
+        Message::Request(request) => write_request(out, *request),
+        Message::Other { id, payload } => write_other(out, *id, payload),
+        other => panic!("{other:?} is no radar's that is played"),
     }
 }
 
@@ -70,30 +37,47 @@ fn any_configuration() -> impl Strategy<Value = Configuration> {
     })
 }
 
-pub fn any_message() -> impl Strategy<Value = Sent> {
-    let powers = || prop::collection::vec(any::<u8>(), 0..300);
+/// Messages with bytes that are never freed.
+pub fn any_message() -> impl Strategy<Value = Message<'static>> {
+    let bytes = || {
+        let bytes = prop::collection::vec(any::<u8>(), 0..300);
+        bytes.prop_map(|bytes| -> &'static [u8] { bytes.leak() })
+    };
+    let azimuth = (
+        any::<[u16; 2]>(),
+        any::<[[u8; 4]; 2]>(),
+        any::<bool>(),
+        bytes(),
+    );
     prop_oneof![
-        Just(Sent::KeepAlive),
-        any_configuration().prop_map(Sent::Configuration),
-        prop::sample::select(Request::ALL.to_vec()).prop_map(Sent::Request),
-        (prop::sample::select(vec![0, 50, 128, 255]), powers())
-            .prop_map(|(id, payload)| Sent::Other(id, payload)),
-        (
-            any::<[u16; 2]>(),
-            any::<[[u8; 4]; 2]>(),
-            any::<bool>(),
-            powers()
-        )
-            .prop_map(|(numbers, times, wide, powers)| Sent::Azimuth(numbers, times, wide, powers)),
+        Just(Message::KeepAlive),
+        any_configuration().prop_map(Message::Configuration),
+        prop::sample::select(Request::ALL.to_vec()).prop_map(Message::Request),
+        (prop::sample::select(vec![0, 50, 128, 255]), bytes())
+            .prop_map(|(id, payload)| Message::Other { id, payload }),
+        azimuth.prop_map(
+            |([sweep_counter, encoder], [seconds, split_seconds], wide, powers)| {
+                Message::Azimuth(Azimuth {
+                    sweep_counter,
+                    encoder,
+                    seconds,
+                    split_seconds,
+                    powers: match wide {
+                        true => Powers::Sixteen(&powers[..powers.len() / 2 * 2]),
+                        false => Powers::Eight(powers),
+                    },
+                })
+            }
+        ),
     ]
 }
 
 proptest! {
     #[test]
-    fn what_is_written_is_decoded(sent in any_message()) {
+    fn what_is_written_is_decoded(message in any_message()) {
         let mut bytes = Vec::new();
-        sent.write(&mut bytes);
-        prop_assert_eq!(decode(bytes[17], &bytes[22..]), Ok(sent.message()));
+        write(&message, &mut bytes);
+        prop_assert_eq!(decode(bytes[17], &bytes[22..]), Ok(message));
     }
 }
 

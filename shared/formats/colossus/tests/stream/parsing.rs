@@ -1,15 +1,19 @@
 //! Streams in pieces, and damaged ones.
 
-use gyre_colossus::{Damage, Event, Parser};
+use gyre_colossus::{Damage, Event, Message, Parser};
 use proptest::prelude::*;
 
-use crate::messages::{Sent, any_message};
+use crate::messages::{any_message, write};
 use crate::support::feed;
 
-fn stream(messages: &[Sent]) -> Vec<u8> {
+fn stream(messages: &[Message<'_>]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    messages.iter().for_each(|sent| sent.write(&mut bytes));
+    messages.iter().for_each(|sent| write(sent, &mut bytes));
     bytes
+}
+
+fn other(payload: &[u8]) -> Message<'_> {
+    Message::Other { id: 41, payload }
 }
 
 /// Returns all events as texts, so that they outlive the parser.
@@ -21,8 +25,8 @@ fn events(bytes: &[u8], piece: usize) -> Vec<String> {
     events
 }
 
-fn texts(messages: &[Sent]) -> Vec<String> {
-    let message = |sent: &Sent| format!("{:?}", Event::Message(sent.message()));
+fn texts(messages: &[Message<'_>]) -> Vec<String> {
+    let message = |sent: &Message<'_>| format!("{:?}", Event::Message(*sent));
     messages.iter().map(message).collect()
 }
 
@@ -75,7 +79,7 @@ proptest! {
             sent.extend(messages);
         }
         // A message that is cut short is recognised once as many bytes follow.
-        let end = vec![Sent::Other(41, vec![0; 70_000])];
+        let end = vec![other(&[0; 70_000])];
         bytes.extend(stream(&end));
         sent.extend(end);
         let (mut found, mut skipped) = (Vec::new(), 0);
@@ -97,7 +101,7 @@ proptest! {
 
 #[test]
 fn damage_is_reported_once_with_its_first_fault() {
-    let message = stream(&[Sent::Other(41, vec![1, 2, 3])]);
+    let message = stream(&[other(&[1, 2, 3])]);
     let edited = |at: usize, byte: u8| {
         let mut bytes = message.clone();
         bytes[at] = byte;
@@ -122,10 +126,14 @@ fn damage_is_reported_once_with_its_first_fault() {
     assert_eq!(first(edited(16, 2)), (Damage::Version(2), 25));
     let size = 0x2000_0003;
     assert_eq!(first(edited(18, 0x20)), (Damage::PayloadSize(size), 25));
-    let long = stream(&[Sent::Other(41, vec![9; 40])]);
+    let long = stream(&[other(&[9; 40])]);
     let cut = [&long[..46], &message].concat();
     assert_eq!(first(cut), (Damage::CutShort, 46));
-    let malformed = stream(&[Sent::Other(30, vec![0; 3]), Sent::KeepAlive]);
+    let cut = Message::Other {
+        id: 30,
+        payload: &[0; 3],
+    };
+    let malformed = stream(&[cut, Message::KeepAlive]);
     let (reason, skipped_bytes) = first(malformed);
     assert_eq!(skipped_bytes, 25);
     let expected = "the payload of an azimuth has 3 bytes, expected at least 14";
@@ -134,13 +142,13 @@ fn damage_is_reported_once_with_its_first_fault() {
 
 #[test]
 fn a_message_that_takes_the_start_of_the_next_one_costs_none() {
-    let [cut, next] = [7, 8].map(|byte| stream(&[Sent::Other(41, vec![byte; 30])]));
+    let [cut, next] = [7, 8].map(|byte| stream(&[other(&[byte; 30])]));
     for lost in 1..16 {
         let bytes = [&cut[..cut.len() - lost], &next, &next].concat();
         let events = events(&bytes, 1 + lost);
         assert_eq!(events.len(), 4, "{events:?}");
         assert_eq!(events[1], "Damaged { reason: CutShort, skipped_bytes: 0 }");
-        let whole = texts(&[Sent::Other(41, vec![8; 30])]);
+        let whole = texts(&[other(&[8; 30])]);
         assert_eq!(events[2..], [&whole[..], &whole].concat());
     }
 }
