@@ -121,17 +121,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_turn_that_took_another_time_shows_no_size() {
-        let counts: Vec<u16> = (0..360).map(|k| 7 + 14 * k).collect();
-        let turn = EncoderTurn::new(&counts, |row| Some(row as i64 * 625_000));
-        assert_eq!(turn.turn_ns(), Some(225_000_000));
-        let turns = [turn];
-        assert_eq!(encoder_counts(&turns, Some(250_000_000), 5600), None);
-        assert_eq!(encoder_counts(&turns, Some(225_000_000), 5600), Some(5_040));
-        assert_eq!(encoder_counts(&turns, None, 5600), Some(5_040));
-    }
-
-    #[test]
     fn counts_that_are_no_turn_show_no_size() {
         let back_and_forth = [9, 3].repeat(5);
         for counts in [&[][..], &[5, 19, 33], &[7; 400], &back_and_forth] {

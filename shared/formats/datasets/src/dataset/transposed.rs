@@ -197,23 +197,3 @@ fn transpose(from: &[u8], columns: usize, to: &mut [u8]) {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn transposition_swaps_indices(rows in 1_usize..150, columns in 1_usize..150) {
-            let from: Vec<u8> = (0..rows * columns).map(|i| (i * 7 % 251) as u8).collect();
-            let mut to = vec![0; from.len()];
-            transpose(&from, columns, &mut to);
-            for row in 0..rows {
-                for column in 0..columns {
-                    prop_assert_eq!(to[column * rows + row], from[row * columns + column]);
-                }
-            }
-        }
-    }
-}

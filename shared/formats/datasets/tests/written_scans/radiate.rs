@@ -19,18 +19,17 @@ fn radiate_times_that_are_off_do_not_move_the_other_scans() {
     let expected = stamps();
     let list = root.path().join("Navtech_Polar.txt");
     let text = fs::read_to_string(&list).unwrap();
-    let year_before = text.replace(
-        "Frame: 000011 Time: 1549986608",
-        "Frame: 000011 Time: 1518450608",
-    );
-    assert_ne!(year_before, text);
-    // A byte order mark is no part of the list.
-    fs::write(&list, format!("\u{feff}{year_before}")).unwrap();
-    assert_eq!(stamps(), expected);
-    let notes = opened(root.path()).notes().join(" ");
-    let sentence =
-        "1 times in Navtech_Polar.txt are more than 10 s from those before and after (frames 11)";
-    assert!(notes.contains(sentence), "{notes}");
+    // A year, or a minute, before or after; a byte order mark is no part of the list.
+    for off in ["1518450608", "1549986548", "1549986668", "1581522608"] {
+        let time = "Frame: 000011 Time: 1549986608";
+        let wrong = text.replace(time, &format!("Frame: 000011 Time: {off}"));
+        assert_ne!(wrong, text);
+        fs::write(&list, format!("\u{feff}{wrong}")).unwrap();
+        assert_eq!(stamps(), expected, "{off}");
+        let notes = opened(root.path()).notes().join(" ");
+        let sentence = "1 times in Navtech_Polar.txt are more than 10 s from those before and after (frames 11)";
+        assert!(notes.contains(sentence), "{notes}");
+    }
 }
 
 #[test]
