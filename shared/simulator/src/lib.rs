@@ -16,7 +16,6 @@ mod layout;
 pub mod occlusion;
 pub mod output;
 pub mod path;
-mod place_noise;
 pub mod profile;
 mod route;
 mod scenery;

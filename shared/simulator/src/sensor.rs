@@ -11,7 +11,6 @@ mod line_of_sight;
 mod scintillation;
 pub mod spectrum;
 mod sweep_poses;
-mod sweep_time;
 
 use std::f64::consts::TAU;
 
@@ -23,7 +22,7 @@ use rand_distr::StandardNormal;
 pub use self::antenna::Antenna;
 use self::beam_index::BeamIndex;
 pub use self::config::SensorConfig;
-pub use self::sweep_time::SweepTime;
+pub use self::sweep_poses::SweepTime;
 use self::{
     echoes::{Echo, View},
     line_of_sight::LineOfSight,

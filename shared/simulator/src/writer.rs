@@ -1,6 +1,5 @@
 //! Writes a simulated drive to a folder, on all processors. Resumes an interrupted one.
 
-mod removal;
 mod resume;
 
 use std::fs::{self, File};
@@ -18,8 +17,7 @@ use crate::error::SimulatorError;
 use crate::image::write_image;
 use crate::simulated_drive::SimulatedDrive;
 
-pub use removal::remove_dataset;
-pub use resume::MADE_BY;
+pub use resume::{MADE_BY, remove_dataset};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {

@@ -5,8 +5,6 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point2, Vector2};
 
-use crate::place_noise::place_hash;
-
 /// Angular scale of a scatterer's lobes, radians: half a wavelength over its size, here some
 /// fifteen centimetres.
 const LOBE_RAD: f64 = 0.012;
@@ -25,6 +23,18 @@ pub(super) fn scintillation(place: Point2<f64>, direction: Vector2<f64>) -> f64 
     // Weights whose squares add up to one keep the mean.
     let angle = share * TAU / 4.0;
     (wave(before) * angle.cos() + wave(before + 1.0) * angle.sin()).norm_squared()
+}
+
+/// A pseudo-random number from 0 to 1 that depends on the place and `index` alone, so that it is the
+/// same in every scan.
+fn place_hash(place: Point2<f64>, index: u64) -> f64 {
+    // The finaliser of SplitMix64 (Steele et al. 2014) over both coordinates' bits.
+    let mut bits = place.x.to_bits()
+        ^ place.y.to_bits().rotate_left(32)
+        ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((bits ^ (bits >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
 #[cfg(test)]
