@@ -2,7 +2,7 @@
 
 use gyre_geometry::{ScanLimits, ScanSlot, scan::flag};
 
-use super::{counters::Counters, powers::PowerOrder};
+use super::{Counters, powers::PowerOrder};
 use crate::{configuration::Configuration, message::Powers};
 
 #[derive(Clone, Copy, Debug)]
