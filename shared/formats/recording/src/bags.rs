@@ -9,7 +9,6 @@ mod files;
 mod radar;
 mod scans;
 mod sensors;
-mod spans;
 mod topics;
 mod writer;
 

@@ -12,9 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Head, RecordingError,
-    newest::{head, newest},
+    newest::{Positions, head, newest},
     parts::{part, parts},
-    position::Positions,
 };
 
 /// The newest part of a recording, and what all parts before it hold.

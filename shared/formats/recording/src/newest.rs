@@ -1,12 +1,31 @@
 //! The newest messages of one file, without a list of all of them in memory.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use mcap::records::op;
+use serde::{Deserialize, Serialize};
 
-use crate::{
-    Head, RecordingError, file::McapFile, head::NO_HEAD, position::Positions, table::Table,
-};
+use crate::{Entry, Head, RecordingError, file::McapFile, head::NO_HEAD, table::Table};
+
+/// The place behind the newest message of a topic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Position {
+    pub next: u64,
+    /// The generation of the newest one.
+    pub generation: u32,
+}
+
+pub type Positions = BTreeMap<String, Position>;
+
+impl Position {
+    /// Goes behind a message. An older one may come again.
+    pub(crate) fn pass(&mut self, entry: &Entry) {
+        let next = entry.seq.saturating_add(1);
+        if (entry.generation, next) > (self.generation, self.next) {
+            (self.generation, self.next) = (entry.generation, next);
+        }
+    }
+}
 
 /// Reads the head of a file, and the positions behind its newest messages.
 pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
