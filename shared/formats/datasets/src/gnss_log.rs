@@ -1,17 +1,21 @@
 //! The log of a GNSS receiver as a file, or in a bag.
 
 mod faults;
-mod received;
 mod table;
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::{self, Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+};
 
 pub use faults::GnssFaults;
-pub use received::ReceivedFixes;
 
 use gyre_geometry::samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
-use crate::{LogError, gps_imu_twist, logs, table::Raw};
+use crate::{
+    LogError, gps_imu_twist, logs,
+    table::{Raw, Rows},
+};
 
 const OF: &str = "gnss";
 
@@ -187,5 +191,57 @@ impl GnssLog {
             path: path.to_owned(),
             topic: None,
         }
+    }
+}
+
+/// The fixes that a live receiver has sent so far: each row of their log is read once.
+pub struct ReceivedFixes {
+    path: PathBuf,
+    end: u64,
+    rows: Option<Rows<table::FixColumns>>,
+}
+
+impl ReceivedFixes {
+    pub fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            end: 0,
+            rows: None,
+        }
+    }
+
+    pub fn read_on(&mut self) -> Result<(), LogError> {
+        let bytes = self.appended();
+        let bytes = bytes.map_err(|source| LogError::unreadable(OF, &self.path, source))?;
+        let text = String::from_utf8_lossy(&bytes);
+        match &mut self.rows {
+            Some(rows) => rows.go_on(&text),
+            None => {
+                let rows = Rows::of(&text);
+                self.rows = Some(rows.map_err(|e| LogError::unknown(OF, &self.path, e))?);
+            }
+        }
+        self.end += bytes.len() as u64;
+        Ok(())
+    }
+
+    pub fn count(&self) -> usize {
+        self.rows.as_ref().map_or(0, |rows| rows.raw.entries.len())
+    }
+
+    pub fn log(&self) -> GnssLog {
+        let rows = self.rows.clone();
+        let (raw, is_plane) = rows.map_or((Raw::of(Vec::new()), false), |rows| {
+            (rows.raw, rows.columns.is_plane)
+        });
+        GnssLog::examined(raw, is_plane, &self.path)
+    }
+
+    fn appended(&self) -> io::Result<Vec<u8>> {
+        let mut file = gyre_storage::open(&self.path)?;
+        file.seek(SeekFrom::Start(self.end))?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Ok(bytes)
     }
 }
