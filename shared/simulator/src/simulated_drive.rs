@@ -6,10 +6,7 @@ mod render_ahead;
 use std::path::PathBuf;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
-use gyre_geometry::{
-    OwnedScan, ScanSlot,
-    samples::{RawFix, Sample},
-};
+use gyre_geometry::{OwnedScan, ScanSlot, samples::Sample};
 use render_ahead::Ahead;
 
 use crate::{
@@ -117,20 +114,13 @@ impl SimulatedDrive {
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
     /// `imu.csv` has them. `None` without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        log::samples(&config.gyro, config.seed, path, self.simulator.span())
+        log::samples(&self.simulator)
     }
 
     /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
     /// that measure.
     pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        wheels::samples(&config.wheels, config.seed, path, self.simulator.span())
-    }
-
-    fn fixes(&self) -> Option<Vec<RawFix>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        gnss::fixes(&config.gnss, config.seed, path, self.simulator.span())
+        wheels::samples(&self.simulator)
     }
 
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
@@ -151,7 +141,7 @@ impl SimulatedDrive {
                 wheels::FILE,
                 self.wheel_samples().map(|it| wheels::csv(&it)),
             ),
-            (gnss::FILE, self.fixes().map(|it| gnss::csv(&it))),
+            (gnss::FILE, gnss::fixes(simulator).map(|it| gnss::csv(&it))),
         ];
         files.extend(
             logs.into_iter()

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::{SimulatedGyroConfig, profile::GyroFigures};
-use crate::{episodes::Episodes, path::Path, stream::Stream};
+use crate::{episodes::Episodes, path::Path, simulator::Simulator, stream::Stream};
 
 pub(crate) const FILE: &str = "imu.csv";
 /// The first row of the file, as in the log of RADIATE.
@@ -26,14 +26,11 @@ const STALL_EVERY_S: f64 = 2.0;
 const STALL_S: f64 = 0.06;
 const LOST: f64 = 0.02;
 
-/// The samples during a drive along a path, which starts at a time and lasts for a duration, by
-/// their stamps: rates and accelerations in the gyro's own axes. `None` without a gyro.
-pub(crate) fn samples(
-    config: &SimulatedGyroConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<Sample>> {
+/// The samples during a drive, by their stamps: rates and accelerations in the gyro's own axes.
+/// `None` without a gyro.
+pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
+    let (config, seed) = (&simulator.config().gyro, simulator.config().seed);
+    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
     let figures = config.profile.figures()?;
     let mut errors = Errors::new(&figures, seed);
     let mut clock = Clock::new(config, seed);
