@@ -11,7 +11,6 @@ pub mod error;
 pub mod gnss;
 pub mod gyro;
 mod image;
-mod interpolate;
 mod layout;
 pub mod occlusion;
 pub mod output;

@@ -20,6 +20,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 pub use self::antenna::Antenna;
+use self::antenna::interpolate;
 use self::beam_index::BeamIndex;
 pub use self::config::SensorConfig;
 pub use self::sweep_poses::SweepTime;
@@ -31,7 +32,6 @@ use self::{
 };
 use crate::{
     body::Moving,
-    interpolate::interpolate,
     path::Path,
     profile::{Chirp, METADATA_BYTES, Receiver, Sampling},
     stream::Stream,

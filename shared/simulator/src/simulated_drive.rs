@@ -15,7 +15,7 @@ use crate::{
     error::SimulatorError,
     gnss,
     gyro::log,
-    layout::{SideFile, boreas, oxford, radiate},
+    layout::{self, radiate},
     output::OutputFormat,
     profile::{Chirp, METADATA_BYTES},
     sensor::Sensor,
@@ -74,8 +74,10 @@ impl SimulatedDrive {
 
     pub fn image_name(&self, index: usize) -> String {
         match self.output {
-            OutputFormat::Oxford => oxford::file_name(&self.simulator, index),
-            OutputFormat::Boreas => boreas::file_name(&self.simulator, index),
+            OutputFormat::Oxford => format!("{}.png", self.simulator.time(index).start_us),
+            OutputFormat::Boreas => {
+                format!("{}.png", layout::boreas_stamp_us(&self.simulator, index))
+            }
             OutputFormat::Radiate => radiate::file_name(index),
         }
     }
@@ -96,7 +98,7 @@ impl SimulatedDrive {
             OutputFormat::Oxford => {
                 (time.start_us + time.stamp_us(self.simulator.sampling().azimuths - 1)) * 500
             }
-            OutputFormat::Boreas => boreas::stamp_us(&self.simulator, index) * 1000,
+            OutputFormat::Boreas => layout::boreas_stamp_us(&self.simulator, index) * 1000,
             OutputFormat::Radiate => radiate::stamp_ns(&self.simulator, index),
         }
     }
@@ -123,11 +125,20 @@ impl SimulatedDrive {
         wheels::samples(&self.simulator)
     }
 
-    pub(crate) fn side_files(&self) -> Vec<SideFile> {
+    pub(crate) fn side_files(&self) -> Vec<(&'static str, String)> {
         let simulator = &self.simulator;
         let mut files = match self.output {
-            OutputFormat::Oxford => oxford::side_files(simulator),
-            OutputFormat::Boreas => boreas::side_files(simulator),
+            OutputFormat::Oxford => vec![
+                ("radar.timestamps", layout::oxford_timestamps(simulator)),
+                (
+                    "gt/radar_odometry.csv",
+                    layout::oxford_odometry_csv(simulator),
+                ),
+            ],
+            OutputFormat::Boreas => vec![(
+                "applanix/radar_poses.csv",
+                layout::boreas_poses_csv(simulator),
+            )],
             OutputFormat::Radiate => Vec::new(),
         };
         let truth = String::from_utf8_lossy(&self.ground_truth_tum()).into_owned();
