@@ -1,8 +1,6 @@
 //! Readers of radar recordings: one trait, one file per format.
 
-mod dataset_toml;
 mod detect;
-mod eccentricity;
 mod encoder;
 mod error;
 mod first_image;
@@ -28,18 +26,18 @@ use std::{
 };
 
 use gyre_geometry::{
+    OwnedScan,
     samples::{BagFixes, Sample, SampleKind},
     scan::{ScanLimits, ScanSlot, SweepGeometry},
 };
+use gyre_radar::{NoDoppler, check_chirps};
 
-pub use dataset_toml::stored_options;
 pub use detect::is_dataset;
-pub use eccentricity::correct_eccentricity;
-pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
+pub use encoder::{EncoderTurn, FIRST_TURNS, correct_eccentricity, encoder_counts};
 pub use error::{OpenError, ReadError};
 pub use format::Format;
 pub use images::{ImageSize, ImageSource};
-pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
+pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption, stored_options};
 pub use radiate::frame_stamps;
 pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns, turn_ns};
 
@@ -239,4 +237,15 @@ fn open_found(
             }
         },
     })
+}
+
+/// Checks by the first scan of a recording that its radar measures the velocity by Doppler: see
+/// [`check_chirps`]. A scan that cannot be read is reported where it is played.
+pub fn check_first_scan(dataset: &mut dyn Dataset) -> Result<(), NoDoppler> {
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    let Ok(geometry) = dataset.read(dataset.first(), scan.slot()) else {
+        return Ok(());
+    };
+    scan.geometry = geometry;
+    check_chirps(&scan.view())
 }

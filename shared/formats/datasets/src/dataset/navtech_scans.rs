@@ -11,8 +11,7 @@ use gyre_geometry::{
 use super::{
     Dataset, Properties,
     detect::Found,
-    eccentricity::correct_eccentricity,
-    encoder::{EncoderTurn, FIRST_TURNS, encoder_counts},
+    encoder::{EncoderTurn, FIRST_TURNS, correct_eccentricity, encoder_counts},
     error::{OpenError, ReadError},
     first_image::{FirstImage, NamedBy},
     format::Format,

@@ -8,7 +8,7 @@ use gyre_geometry::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry, fla
 use super::{
     Dataset, Properties,
     detect::Found,
-    eccentricity::correct_eccentricity,
+    encoder::correct_eccentricity,
     error::{OpenError, ReadError},
     images::Images,
     navtech_png::fill_uniform,
