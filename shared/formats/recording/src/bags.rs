@@ -3,7 +3,6 @@
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
 
-mod azimuths;
 mod bag;
 mod files;
 mod radar;

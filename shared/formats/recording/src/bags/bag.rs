@@ -12,10 +12,9 @@ use mcap::records::op;
 use crate::{
     bags::{
         Channel, McapFile, Message, RecordingError,
-        azimuths::described,
         files::{Files, compressed},
         radar::{ENCODER_COUNTS, Survey},
-        topics::{Kind, Topics},
+        topics::{Kind, Topics, described},
     },
     file::{Span, Times, joined},
 };

@@ -22,11 +22,10 @@ use index::{Entry, Index};
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::azimuths,
     bag::{Bag, Key},
     files::{Files, files},
     sensors,
-    topics::Topics,
+    topics::{Topics, azimuths},
 };
 
 pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {

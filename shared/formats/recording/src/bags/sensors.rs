@@ -13,9 +13,9 @@ use gyre_ros2_messages::{
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::of,
     bag::{Bag, Key},
     files::files,
+    topics::of,
 };
 
 type Decode<T> = fn(&Message) -> Result<T, String>;
