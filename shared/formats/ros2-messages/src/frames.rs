@@ -6,14 +6,17 @@
 
 use std::str::FromStr;
 
+use gyre_contract::{PoseHeader, flag, outcome};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose as planar, xy_yaw};
 use nalgebra::{Matrix3, Rotation2, Vector2};
 
 use crate::{
+    Mounting,
     builtin_interfaces::Time,
     geometry_msgs::{self, Covariance, Point, Quaternion, Transform, TransformStamped, Vector3},
     nav_msgs::{MapMetaData, OccupancyGrid, Odometry},
     std_msgs::Header,
+    tf2_msgs::TFMessage,
 };
 
 /// Variance of the quantities that planar odometry does not measure: z, roll and pitch, and their
@@ -59,14 +62,65 @@ impl FromStr for Frames {
     }
 }
 
+/// The vehicle that carries the radar: the messages of a run's poses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Vehicle {
+    pub frames: Frames,
+    pub mounting: Mounting,
+}
+
+impl Vehicle {
+    /// Returns the place of the radar on the vehicle.
+    pub fn mounted(&self, stamp_ns: i64) -> TFMessage {
+        let (base, radar) = (&self.frames.base, &self.frames.radar);
+        let mounted = transform(stamp_ns, base, radar, self.mounting.radar());
+        TFMessage {
+            transforms: vec![mounted],
+        }
+    }
+
+    /// Returns a pose of the radar as odometry of the vehicle.
+    pub fn odometry(&self, stamp_ns: i64, pose: &PoseHeader) -> Odometry {
+        let motion = pose.motion.motion().alone();
+        let since = Interval {
+            motion: self.mounting.of_vehicle_uncertain(&motion),
+            duration_ns: pose.motion.interval_ns,
+            is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
+        };
+        let since = (!pose.item.is(flag::BREAK)).then_some(&since);
+        let vehicle = self.mounting.of_vehicle_uncertain(&pose.pose());
+        odometry(stamp_ns, &self.frames, &vehicle, since)
+    }
+
+    /// Returns a pose of the radar as the transform of odometry, and with SLAM the correction by
+    /// loops as the transform of the map.
+    pub fn transforms(
+        &self,
+        stamp_ns: i64,
+        pose: &PoseHeader,
+        map_from_odometry: Option<&Pose>,
+    ) -> TFMessage {
+        let Frames {
+            map, odom, base, ..
+        } = &self.frames;
+        let vehicle = self.mounting.of_vehicle(&pose.pose().motion);
+        let mut transforms = vec![transform(stamp_ns, odom, base, &vehicle)];
+        transforms.extend(map_from_odometry.map(|correction| {
+            let correction = self.mounting.of_vehicle(correction);
+            transform(stamp_ns, map, odom, &correction)
+        }));
+        TFMessage { transforms }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Interval {
+struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
     /// the earlier frame.
-    pub motion: UncertainMotion,
-    pub duration_ns: i64,
+    motion: UncertainMotion,
+    duration_ns: i64,
     /// True if it was measured, not predicted from earlier motions.
-    pub is_measured: bool,
+    is_measured: bool,
 }
 
 /// Returns a pose in the odometry frame, and the velocity that led to it, as odometry.
@@ -76,7 +130,7 @@ pub(crate) struct Interval {
 /// covariance that follows from the motion's. The velocity of a predicted motion has the variance
 /// [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
 /// zero, with the same variance.
-pub(crate) fn odometry(
+fn odometry(
     stamp_ns: i64,
     frames: &Frames,
     pose: &UncertainMotion,
@@ -150,7 +204,7 @@ fn seconds(since: &Interval) -> f64 {
 }
 
 /// Returns the pose of the frame `inner` in the frame `outer`.
-pub(crate) fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
+fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
     let geometry_msgs::Pose {
         position: Point { x, y, z },
         orientation: rotation,

@@ -16,12 +16,11 @@ pub mod radar;
 pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod tf2_msgs;
-mod vehicle;
 pub mod vision_msgs;
 pub mod visualization_msgs;
 
 pub use cdr::{decode, encode};
 pub use definition::{Definition, Ros2Message};
 pub use domain::Domain;
+pub use frames::Vehicle;
 pub use mounting::Mounting;
-pub use vehicle::Vehicle;
