@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::common::all_files;
+use crate::all_files;
 use gyre_simulator::{
     GyroProfile, SimulatedGyroConfig, SimulationConfig, Simulator, write_dataset,
 };
