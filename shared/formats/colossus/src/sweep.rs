@@ -1,7 +1,6 @@
 //! Azimuths to scans, whose angles, times and scales equal a recording of the same azimuths, to the
 //! bit.
 
-mod powers;
 mod rows;
 mod seam;
 
@@ -12,8 +11,7 @@ use gyre_geometry::{ScanLimits, ScanSlot, Sense, SweepGeometry};
 
 use crate::{
     configuration::{BadConfiguration, Configuration},
-    kept::KeptAzimuth,
-    message::Azimuth,
+    message::{Azimuth, KeptAzimuth},
 };
 use rows::{Empty, RowWriter};
 use seam::{Grid, Seam};
