@@ -7,7 +7,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{episodes::Episodes, simulator::Simulator, stream::Stream};
+use crate::{
+    simulator::Simulator,
+    stream::{Episodes, Stream},
+};
 
 pub(crate) const FILE: &str = "gnss.csv";
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";

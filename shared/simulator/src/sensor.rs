@@ -4,7 +4,6 @@
 //! resolution cell interfere (speckle), differently from each pose. Noise is the receiver's alone.
 
 mod antenna;
-mod beam_index;
 mod config;
 mod echoes;
 mod line_of_sight;
@@ -21,11 +20,10 @@ use rand_distr::StandardNormal;
 
 pub use self::antenna::Antenna;
 use self::antenna::interpolate;
-use self::beam_index::BeamIndex;
 pub use self::config::SensorConfig;
 pub use self::sweep_poses::SweepTime;
 use self::{
-    echoes::{Echo, View},
+    echoes::{BeamIndex, Echo, View},
     line_of_sight::LineOfSight,
     spectrum::{NOISE_OVERLAP, RangeSpectrum},
     sweep_poses::SweepPoses,

@@ -6,7 +6,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{episodes::Episodes, path::Path, simulator::Simulator, stream::Stream};
+use crate::{
+    path::Path,
+    simulator::Simulator,
+    stream::{Episodes, Stream},
+};
 
 pub(crate) const FILE: &str = "wheels.csv";
 const HEADER: &str = "stamp_ns,speed_m_s";

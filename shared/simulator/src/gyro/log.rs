@@ -10,7 +10,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::{SimulatedGyroConfig, profile::GyroFigures};
-use crate::{episodes::Episodes, path::Path, simulator::Simulator, stream::Stream};
+use crate::{
+    path::Path,
+    simulator::Simulator,
+    stream::{Episodes, Stream},
+};
 
 pub(crate) const FILE: &str = "imu.csv";
 /// The first row of the file, as in the log of RADIATE.

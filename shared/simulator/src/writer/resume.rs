@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use gyre_datasets::ImageSource as _;
 use gyre_storage::{SETTINGS, StorageError, read_bytes, read_text};
 
+use super::encode;
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
-use crate::image::encode;
 use crate::simulated_drive::SimulatedDrive;
 
 /// The file with the configuration that made a dataset.
