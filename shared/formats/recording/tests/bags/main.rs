@@ -6,7 +6,6 @@ mod drivers;
 mod encoders;
 mod fixes;
 mod messages;
-mod order;
 mod samples;
 #[path = "../../../ros2-messages/tests/turn.rs"]
 mod turn;
