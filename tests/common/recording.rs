@@ -10,7 +10,7 @@ use std::{
     sync::OnceLock,
 };
 
-use gyre_simulator::{OutputFormat, Profile, SimulationConfig, drive::DriveConfig, write_dataset};
+use gyre_simulator::{DriveConfig, OutputFormat, Profile, SimulationConfig, write_dataset};
 use tempfile::TempDir;
 
 use super::Run;

@@ -5,7 +5,6 @@
 pub mod body;
 mod cars;
 pub mod config;
-pub mod drive;
 pub mod error;
 pub mod gnss;
 pub mod gyro;
@@ -27,8 +26,7 @@ pub mod world;
 pub mod writer;
 
 pub use body::{Body, Moving};
-pub use config::{Realism, SimulationConfig};
-pub use drive::DriveConfig;
+pub use config::{DriveConfig, Realism, SimulationConfig};
 pub use error::SimulatorError;
 pub use gnss::SimulatedGnssConfig;
 pub use gyro::{GyroProfile, SimulatedGyroConfig};

@@ -7,7 +7,6 @@ mod antenna;
 mod config;
 mod echoes;
 mod line_of_sight;
-mod scintillation;
 pub mod spectrum;
 mod sweep_poses;
 

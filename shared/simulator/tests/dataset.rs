@@ -100,7 +100,7 @@ fn another_seed_gives_other_streets_and_another_one_of_the_radar_the_same() {
 fn invalid_configuration_names_its_key() {
     let error = |config: SimulationConfig| Simulator::new(&config).err().unwrap().to_string();
     assert!(error(config(0)).contains("`scans`"));
-    let drive = gyre_simulator::drive::DriveConfig {
+    let drive = gyre_simulator::DriveConfig {
         speed_mps: f64::NAN,
         ..Default::default()
     };

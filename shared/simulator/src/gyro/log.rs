@@ -9,7 +9,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{SimulatedGyroConfig, profile::GyroFigures};
+use super::{GyroFigures, SimulatedGyroConfig};
 use crate::{
     path::Path,
     simulator::Simulator,
