@@ -16,7 +16,6 @@ mod profiles;
 mod radiate;
 mod row_order;
 mod sensor_clock;
-mod stale;
 pub(crate) mod stamp;
 mod transposed;
 

@@ -19,9 +19,8 @@ use super::{
     images::Images,
     options::DatasetOptions,
     sensor_clock::SensorClock,
-    stale::StaleRows,
     stamp::{self, SECOND_NS},
-    transposed::{TransposedScans, Turn},
+    transposed::{StaleRows, TransposedScans, Turn},
 };
 
 /// The largest list of stamps: months of scans.

@@ -4,7 +4,6 @@
 mod damage;
 mod drivers;
 mod encoders;
-mod fixes;
 mod messages;
 mod samples;
 #[path = "../../../ros2-messages/tests/turn.rs"]
