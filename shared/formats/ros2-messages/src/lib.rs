@@ -1,7 +1,6 @@
 //! The ROS 2 messages that Gyre speaks, without I/O.
 
 pub mod builtin_interfaces;
-mod cdr;
 mod definition;
 pub mod diagnostic_msgs;
 mod domain;
@@ -19,8 +18,7 @@ pub mod tf2_msgs;
 pub mod vision_msgs;
 pub mod visualization_msgs;
 
-pub use cdr::{decode, encode};
-pub use definition::{Definition, Ros2Message};
+pub use definition::{Definition, Ros2Message, decode, encode};
 pub use domain::Domain;
 pub use frames::Vehicle;
 pub use mounting::Mounting;

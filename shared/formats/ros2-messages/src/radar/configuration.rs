@@ -6,7 +6,7 @@ use gyre_colossus::{Azimuth, Configuration, Powers};
 
 use crate::{
     Ros2Message,
-    cdr::bad,
+    definition::bad,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarConfigurationMsg, RadarFftDataMsg},
     std_msgs::Header,
