@@ -11,8 +11,8 @@ use gyre_storage::SETTINGS;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Head, RecordingError,
-    newest::{Positions, head, newest},
+    Head, Positions, RecordingError,
+    head::{head, newest},
     parts::{part, parts},
 };
 

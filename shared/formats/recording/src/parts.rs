@@ -12,7 +12,7 @@ use bytemuck::pod_read_unaligned;
 use gyre_contract::Item;
 
 use crate::{
-    Entry, Head, Incoming, Ledger, Positions, RecordingError, RecordingWriter, newest::head,
+    Entry, Head, Incoming, Ledger, Positions, RecordingError, RecordingWriter, head::head,
 };
 
 /// Returns the path of a part, from 1.
