@@ -1,4 +1,4 @@
-//! Readers of radar recordings: one trait, one file per format.
+//! Readers of radar recordings: one trait for all formats.
 
 mod detect;
 mod encoder;
@@ -7,7 +7,6 @@ mod first_image;
 mod format;
 mod image_list;
 mod images;
-mod mulran;
 mod navtech_png;
 mod navtech_scans;
 mod options;
@@ -225,7 +224,7 @@ fn open_found(
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check_without_topics(found.format)?;
     Ok(match found.format {
-        Format::Mulran => Box::new(mulran::open(found, options)?),
+        Format::Mulran => Box::new(transposed::open_mulran(found, options)?),
         Format::Radiate => Box::new(radiate::open(found, options)?),
         format => match profiles::Profile::of(format) {
             Some(profile) => Box::new(navtech_scans::NavtechScans::open(found, options, profile)?),

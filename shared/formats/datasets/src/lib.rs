@@ -1,4 +1,4 @@
-//! Recordings of radars on disk, and what lies beside them: one file per format. Begin with
+//! Recordings of radars on disk, and what lies beside them. Begin with
 //! [`mod@dataset`]: the scans of a recording behind one trait.
 
 pub mod dataset;

@@ -13,7 +13,8 @@ use super::{
     images::Images,
     navtech_png::fill_uniform,
     options::{DatasetOptions, LostAzimuthOption},
-    profiles::Profile,
+    profiles::{MULRAN_RESOLUTION_M, Profile},
+    stamp,
 };
 
 /// Side of the blocks of the transposition, pixels: a cache line.
@@ -24,6 +25,8 @@ const STALE: f64 = 0.85;
 /// Share of the bins, the nearest, that are left out: the echoes of the vehicle itself are the same
 /// in each turn.
 const NEAR: f64 = 0.05;
+const MULRAN_STAMPS: &str = "Files are named by the time of the last column; columns are spread uniformly over a turn, which is the time since \
+                      the previous file, and the time of a scan is the mean of its columns'.";
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turn {
@@ -184,6 +187,44 @@ impl Dataset for TransposedScans {
         let scan_ns = self.stamp_ns(&turn);
         Ok(self.profile.geometry(azimuths, [0, bins], scan_ns))
     }
+}
+
+/// Opens MulRan as recorded: `sensor_data/radar/polar/<ns>.png`, 3360 rows of range x 400 columns of
+/// azimuth without metadata, named by the last row's stamp.
+///
+/// Column k is row k of the form of Oxford, where the encoder gives 7, 21, ..., 5593 of 5600 counts
+/// (KAIST03): the middle of the k-th of 400 equal parts of the turn.
+pub(crate) fn open_mulran(
+    found: Found,
+    options: &DatasetOptions,
+) -> Result<TransposedScans, OpenError> {
+    let mut scans = TransposedScans::open(found, options, MULRAN_STAMPS, |_| MULRAN_RESOLUTION_M)?;
+    scans.first_azimuth = 0.5;
+    let ends_ns = (0..scans.images.len()).map(|index| end_ns(&scans.images, index));
+    let ends_ns = ends_ns.collect::<Result<Vec<_>, _>>()?;
+    let turn_ns = stamp::turn_ns(ends_ns.iter().copied()).unwrap_or(stamp::DEFAULT_TURN_NS);
+    let azimuths = scans.azimuths() as i64;
+    let turn = |(index, &end_ns): (usize, &i64)| {
+        let interval_ns = index.checked_sub(1).map(|before| end_ns - ends_ns[before]);
+        let period_ns = interval_ns.filter(|ns| (ns - turn_ns).abs() < turn_ns / 5);
+        let period_ns = period_ns.unwrap_or(turn_ns);
+        Turn {
+            start_ns: end_ns - period_ns * (azimuths - 1) / azimuths,
+            period_ns,
+            logged_ns: end_ns,
+        }
+    };
+    scans.properties.period_ns = turn_ns;
+    scans.turns = ends_ns.iter().enumerate().map(turn).collect();
+    Ok(scans)
+}
+
+fn end_ns(images: &Images, index: usize) -> Result<i64, OpenError> {
+    images.name_stamp_ns(index).ok_or_else(|| {
+        let reason = "a MulRan image is named by its time in ns, of the years 2015 to 2040";
+        let remedy = "rename it, or set the `format` that it is of";
+        OpenError::unknown_layout(images.file(index), reason, remedy)
+    })
 }
 
 /// `to[column][row] = from[row][column]`, for `from` of `columns` columns and `to` of the same
