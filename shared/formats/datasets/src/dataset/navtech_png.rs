@@ -1,7 +1,7 @@
 //! The metadata columns that Navtech drivers store before the powers of each row: stamp, encoder
 //! count, one byte of flags.
 
-use std::path::Path;
+use std::{f64::consts::TAU, path::Path};
 
 use gyre_geometry::scan::{check_sweep, flag};
 
@@ -89,7 +89,7 @@ pub(crate) fn fill_azimuths(
 ) -> Result<(), ReadError> {
     check_order(path, rows(pixels, size).map(|row| row.count), counts)?;
     check_turn(path, rows(pixels, size).map(|row| row.count), counts)?;
-    let step = std::f64::consts::TAU / f64::from(counts);
+    let step = TAU / f64::from(counts);
     for (row, into) in rows(pixels, size).zip(azimuth_rad) {
         *into = (f64::from(row.count % counts) * step) as f32;
     }
@@ -98,7 +98,7 @@ pub(crate) fn fill_azimuths(
 
 /// Writes uniform angles: row `i` of `n` at `2 pi (first + i) / n`.
 pub(crate) fn fill_uniform(azimuth_rad: &mut [f32], first: f64) {
-    let step = std::f64::consts::TAU / azimuth_rad.len() as f64;
+    let step = TAU / azimuth_rad.len() as f64;
     for (row, into) in azimuth_rad.iter_mut().enumerate() {
         *into = ((first + row as f64) * step) as f32;
     }
@@ -192,7 +192,8 @@ pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
         return;
     }
     let middle_ns = stamp::middle_ns(stamp_ns[0], stamp_ns[n - 1]);
-    let angle = |row: usize| sweep_angle(azimuth_rad[0], azimuth_rad[row]);
+    let first_rad = f64::from(azimuth_rad[0]);
+    let angle = |row: usize| (f64::from(azimuth_rad[row]) - first_rad).rem_euclid(TAU);
     let mean_angle = (0..n).map(angle).sum::<f64>() / n as f64;
     let (mut covariance, mut variance) = (0.0, 0.0);
     for (row, stamp) in stamp_ns.iter().enumerate() {
@@ -205,10 +206,6 @@ pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
     for (row, stamp) in stamp_ns.iter_mut().enumerate() {
         *stamp = middle_ns + ((angle(row) - middle_angle) * ns_per_rad).round() as i64;
     }
-}
-
-fn sweep_angle(first_rad: f32, azimuth_rad: f32) -> f64 {
-    (f64::from(azimuth_rad) - f64::from(first_rad)).rem_euclid(std::f64::consts::TAU)
 }
 
 #[cfg(test)]

@@ -66,10 +66,6 @@ impl Topic {
     fn has_scans(&self) -> bool {
         !matches!(self.kind, Kind::Configuration(_))
     }
-
-    fn is_b_scan_image(&self) -> bool {
-        self.kind == Kind::Images && self.name.ends_with("b_scan_image")
-    }
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -147,7 +143,9 @@ fn candidates<'a>(topics: &'a BTreeSet<Topic>, wished: Option<&str>) -> Vec<&'a 
     }
     let radar: Vec<_> = scans().filter(|topic| topic.kind != Kind::Images).collect();
     match radar.is_empty() {
-        true => scans().filter(|topic| topic.is_b_scan_image()).collect(),
+        true => scans()
+            .filter(|topic| topic.name.ends_with("b_scan_image"))
+            .collect(),
         false => radar,
     }
 }
