@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod dataset;
-mod recorded_drives;
 mod simulated_drive;
 mod sweep;
 

@@ -3,7 +3,6 @@
 
 mod formats;
 mod images;
-mod lost_azimuths;
 mod rows;
 mod series;
 

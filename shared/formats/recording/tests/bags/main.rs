@@ -3,7 +3,6 @@
 
 mod damage;
 mod drivers;
-mod encoders;
 mod messages;
 mod samples;
 #[path = "../../../ros2-messages/tests/turn.rs"]
