@@ -10,6 +10,7 @@ use std::{
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
 use gyre_geometry::{OwnedScan, ScanSlot, samples::Sample};
+use gyre_radar::Trajectory;
 
 use crate::{
     cars,
@@ -22,7 +23,7 @@ use crate::{
     profile::{Chirp, METADATA_BYTES},
     sensor::Sensor,
     simulator::Simulator,
-    truth, wheels,
+    wheels,
 };
 
 /// Images that are rendered ahead of the reader, which bounds the memory.
@@ -117,7 +118,14 @@ impl SimulatedDrive {
     }
 
     pub fn ground_truth_tum(&self) -> Vec<u8> {
-        truth::ground_truth_tum(&self.simulator, self.stamps_ns())
+        let (simulator, stamps_ns) = (&self.simulator, self.stamps_ns());
+        let pose = |stamp_ns: &i64| simulator.path().pose(simulator.drive_time_s(*stamp_ns));
+        let poses = stamps_ns.iter().map(pose).collect();
+        let stamp_ns = Some(stamps_ns);
+        let mut text = Vec::new();
+        // Writing to memory cannot fail, and there are stamps.
+        let _ = gyre_datasets::write_tum(&Trajectory { stamp_ns, poses }, &mut text);
+        text
     }
 
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
@@ -150,7 +158,7 @@ impl SimulatedDrive {
         };
         let truth = String::from_utf8_lossy(&self.ground_truth_tum()).into_owned();
         files.push(("ground_truth.tum", truth));
-        let objects = truth::objects_csv(simulator, &self.stamps_ns());
+        let objects = cars::objects_csv(simulator, &self.stamps_ns());
         files.push((cars::FILE, objects));
         let logs = [
             ("Navtech_Polar.txt", self.stamps()),
