@@ -13,7 +13,7 @@ use csv::StringRecord;
 use gyre_geometry::samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
 use crate::{
-    LogError, gps_imu_twist,
+    LogError,
     header::{Header, Sign, Stamp},
     logs, parse_seconds,
     table::{Columns, Raw, Rows},
@@ -93,7 +93,7 @@ impl GnssLog {
             sigma_m: RawFix::sigma_of([first[0], second[1]]),
             ..RawFix::default()
         };
-        Ok((gps_imu_twist::read(path, [0, 1, 2], fix)?, false))
+        Ok((logs::gps_imu_twist(path, [0, 1, 2], fix)?, false))
     }
 
     /// Returns all fixes of a log as one table.

@@ -15,7 +15,7 @@ use csv::StringRecord;
 use gyre_geometry::samples::{Sample, SampleKind, UpAxis};
 
 use crate::{
-    Format, LogError, gps_imu_twist,
+    Format, LogError,
     header::{Header, Stamp, endings},
     logs,
     table::{Columns, Raw},
@@ -64,7 +64,7 @@ impl SampleLog {
     pub fn read_gyro(path: &Path) -> Result<Self, LogError> {
         if path.is_dir() {
             // The lines of the angular rates and of the accelerations.
-            let raw = gps_imu_twist::read(path, [5, 6], sample)?;
+            let raw = logs::gps_imu_twist(path, [5, 6], sample)?;
             return faults::examine(raw, false, path, &faults::RATES);
         }
         let rows = logs::rows::<GyroColumns>(path, OF)?;

@@ -4,7 +4,6 @@
 pub mod dataset;
 pub mod fingerprint;
 mod gnss_log;
-mod gps_imu_twist;
 pub mod ground_truth;
 mod gyro_log;
 mod header;
