@@ -7,7 +7,6 @@ mod domain;
 pub mod frames;
 pub mod geometry_msgs;
 pub mod messages;
-mod mounting;
 pub mod nav_msgs;
 pub mod navtech_msgs;
 pub mod objects;
@@ -20,5 +19,4 @@ pub mod visualization_msgs;
 
 pub use definition::{Definition, Ros2Message, decode, encode};
 pub use domain::Domain;
-pub use frames::Vehicle;
-pub use mounting::Mounting;
+pub use frames::{Mounting, Vehicle};
