@@ -19,7 +19,6 @@ pub mod sensor;
 pub mod simulated_drive;
 pub mod simulator;
 mod stream;
-mod tunnel;
 pub mod wheels;
 pub mod world;
 pub mod writer;
