@@ -11,7 +11,6 @@ mod inspect;
 mod logs;
 mod plain_words;
 mod scan_samples;
-mod stretches;
 mod table;
 mod wheel_log;
 

@@ -9,8 +9,7 @@ use serde::Serialize;
 
 use crate::{
     LogError,
-    stretches::{between, longest_chain},
-    table::{Raw, leave_out},
+    table::{Raw, between, leave_out, longest_chain},
 };
 use gyre_geometry::samples::{Sample, SampleKind};
 
