@@ -183,8 +183,8 @@ fn scintillation(place: Point2<f64>, direction: Vector2<f64>) -> f64 {
     (wave(before) * angle.cos() + wave(before + 1.0) * angle.sin()).norm_squared()
 }
 
-/// A pseudo-random number from 0 to 1 that depends on the place and `index` alone, so that it is the
-/// same in every scan.
+/// A pseudo-random number from 0 to 1 that depends on the place and `index` alone, so that it is
+/// the same in every scan.
 fn place_hash(place: Point2<f64>, index: u64) -> f64 {
     // The finaliser of SplitMix64 (Steele et al. 2014) over both coordinates' bits.
     let mut bits = place.x.to_bits()

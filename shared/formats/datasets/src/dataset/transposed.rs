@@ -189,8 +189,8 @@ impl Dataset for TransposedScans {
     }
 }
 
-/// Opens MulRan as recorded: `sensor_data/radar/polar/<ns>.png`, 3360 rows of range x 400 columns of
-/// azimuth without metadata, named by the last row's stamp.
+/// Opens MulRan as recorded: `sensor_data/radar/polar/<ns>.png`, 3360 rows of range x 400 columns
+/// of azimuth without metadata, named by the last row's stamp.
 ///
 /// Column k is row k of the form of Oxford, where the encoder gives 7, 21, ..., 5593 of 5600 counts
 /// (KAIST03): the middle of the k-th of 400 equal parts of the turn.
