@@ -1,82 +1,29 @@
 //! Bags of ROS 2: the file, and the messages in it.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{fs, path::Path};
 
 use bolero::{TypeGenerator, check};
-use gyre_colossus::Configuration;
 use gyre_datasets::DatasetOptions;
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_geometry::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
-use gyre_ros2_messages::{Ros2Message, encode, radar::ScanMessages};
-use mcap::{WriteOptions, Writer, records::MessageHeader};
+use gyre_geometry::OwnedScan;
+use gyre_ros2_messages::radar::ScanMessages;
+use mcap::WriteOptions;
 
+use self::{
+    messages::Messages,
+    turn::{AZIMUTHS, START_NS, radar, scan},
+};
 use crate::recordings::folder;
 
-const AZIMUTHS: usize = 16;
-const BINS: usize = 24;
+#[path = "../../shared/formats/recording/tests/bags/messages.rs"]
+mod messages;
+#[path = "../../shared/formats/ros2-messages/tests/turn.rs"]
+mod turn;
+
 const TURNS: usize = 3;
-const START_NS: i64 = 1_547_131_046_000_000_000;
-
-/// A message of a bag.
-struct Message {
-    topic: &'static str,
-    type_name: String,
-    text: String,
-    log_ns: i64,
-    data: Vec<u8>,
-}
-
-impl Message {
-    fn of<T: Ros2Message>(topic: &'static str, log_ns: i64, message: &T) -> Self {
-        Self {
-            topic,
-            type_name: T::DEFINITION.type_name(),
-            text: T::DEFINITION.text(),
-            log_ns,
-            data: encode(message).unwrap(),
-        }
-    }
-}
-
-fn radar() -> Configuration {
-    Configuration {
-        azimuth_samples: AZIMUTHS as u16,
-        range_in_bins: BINS as u16,
-        encoder_size: 5600,
-        rotation_mhz: 4000,
-        range_resolution_m: Some(0.0438),
-        ..Configuration::default()
-    }
-}
-
-fn scan(turn: usize) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: AZIMUTHS * BINS,
-        azimuths: AZIMUTHS,
-    });
-    for row in 0..AZIMUTHS {
-        let encoder = (350 * row + 13) as f64;
-        scan.azimuth_rad[row] = (encoder * std::f64::consts::TAU / 5600.0) as f32;
-        scan.stamp_ns[row] = START_NS + (250_000_000 * turn + 15_625_000 * row) as i64;
-        scan.flags[row] = flag::MEASURED;
-    }
-    scan.bytes = (0..AZIMUTHS * BINS).map(|k| k as u8).collect();
-    scan.geometry = SweepGeometry {
-        azimuths: AZIMUTHS,
-        bins: BINS,
-        stride: BINS,
-        first_byte: 0,
-        range_resolution_m: 0.0438,
-        range_offset_m: 0.0,
-        doppler_s: 0.0,
-        sense: Sense::Clockwise,
-        stamp_ns: scan.stamp_ns[AZIMUTHS / 2],
-    };
-    scan
-}
 
 /// The form of a bag.
 #[derive(Clone, Copy, Debug, Default, TypeGenerator)]
@@ -90,19 +37,17 @@ struct Form {
 }
 
 /// The messages of a bag.
-fn messages(form: Form) -> Vec<Message> {
+fn messages(form: Form) -> Messages {
     let described = ScanMessages::new(radar(), "radar").configuration(START_NS);
     let mut sent = radar();
     sent.encoder_size = form.encoder_size.unwrap_or(sent.encoder_size);
-    let mut writer = ScanMessages::new(sent, "radar");
-    let mut messages = vec![Message::of("/configuration", START_NS, &described)];
+    let (mut writer, mut messages) = (ScanMessages::new(sent, "radar"), Messages::default());
+    messages.add("/configuration", START_NS, &described);
     for turn in 0..TURNS {
         let scan = scan(turn);
-        let end_ns = scan.stamp_ns[AZIMUTHS - 1];
         if form.by_azimuth {
             for azimuth in writer.azimuths(scan.view()) {
-                let stamp_ns = azimuth.header.stamp.ns();
-                messages.push(Message::of("/fft_data", stamp_ns, &azimuth));
+                messages.add("/fft_data", azimuth.header.stamp.ns(), &azimuth);
             }
             continue;
         }
@@ -110,33 +55,19 @@ fn messages(form: Form) -> Vec<Message> {
         if form.has_microseconds {
             turn.timestamps.iter_mut().for_each(|ns| *ns /= 1_000);
         }
-        messages.push(Message::of("/b_scan_msg", end_ns, &turn));
+        messages.add("/b_scan_msg", scan.stamp_ns[AZIMUTHS - 1], &turn);
     }
     messages
 }
 
 /// Writes a bag without compression and checksums, so that edits of the file reach its messages.
-fn write(path: &Path, messages: &[Message], chunks: bool) {
+fn write(path: &Path, messages: &Messages, chunks: bool) {
     let options = WriteOptions::new()
-        .profile("ros2")
         .compression(None)
         .use_chunks(chunks)
-        .chunk_size(Some(2000))
+        .chunk_size(Some(4000))
         .calculate_chunk_crcs(false);
-    let mut mcap: Writer<fs::File> = options.create(fs::File::create(path).unwrap()).unwrap();
-    for (sequence, message) in messages.iter().enumerate() {
-        let (name, text) = (&message.type_name, message.text.as_bytes());
-        let schema = mcap.add_schema(name, "ros2msg", text).unwrap();
-        let channel = mcap.add_channel(schema, message.topic, "cdr", &BTreeMap::new());
-        let header = MessageHeader {
-            channel_id: channel.unwrap(),
-            sequence: sequence as u32,
-            log_time: message.log_ns as u64,
-            publish_time: message.log_ns as u64,
-        };
-        mcap.write_to_known_channel(&header, &message.data).unwrap();
-    }
-    mcap.finish().unwrap();
+    messages.write(path, options);
 }
 
 /// Opens a bag and reads all its scans, from the last to the first. An accepted bag must be
@@ -195,21 +126,21 @@ fn bags() {
         });
 }
 
-fn edit_messages(messages: &mut Vec<Message>, edit: &BagEdit) {
+fn edit_messages(Messages(messages): &mut Messages, edit: &BagEdit) {
     let count = messages.len();
     if count == 0 {
         return;
     }
     match edit {
         BagEdit::Message(index, edits) => {
-            edit_bytes(&mut messages[usize::from(*index) % count].data, edits);
+            edit_bytes(&mut messages[usize::from(*index) % count].4, edits);
         }
         BagEdit::Lost(index) => {
             messages.remove(usize::from(*index) % count);
         }
         BagEdit::TimeFrom(index, by) => {
             let later = messages[usize::from(*index) % count..].iter_mut();
-            later.for_each(|message| message.log_ns = message.log_ns.wrapping_add(*by));
+            later.for_each(|(.., log_ns, _)| *log_ns = log_ns.wrapping_add(*by));
         }
         BagEdit::File(_) => {}
     }

@@ -1,5 +1,5 @@
 //! Gyre's own files, which another version, a bad disk or another program may have changed: the
-//! journal and the refinement's map.
+//! journal, the refinement's map and the log of keyframes.
 
 use std::{fs, path::Path};
 
@@ -9,12 +9,13 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
 };
-use gyre_geometry::{Pose, SparsePoint};
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_journal::{
     self as journal, Journal,
     checkpoint::{self, Checkpoint},
 };
 use gyre_matching::{RefinementConfig, Refiner};
+use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 
 use crate::recordings::folder;
 
@@ -24,14 +25,14 @@ const RECORD: usize = size_of::<PoseHeader>() + 8;
 
 /// An edit of a file of records with checksums.
 #[derive(Clone, Debug, TypeGenerator)]
-pub enum Edit {
+enum Edit {
     Bytes(ByteEdit),
     /// A word of a record, whose checksum is mended.
     Word(u8, u16, Number),
 }
 
 /// Edits a file; `word` changes a word, and mends the checksums.
-pub fn edited(file: &[u8], edits: &[Edit], word: impl Fn(&mut [u8], usize, usize, u64)) -> Vec<u8> {
+fn edited(file: &[u8], edits: &[Edit], word: impl Fn(&mut [u8], usize, usize, u64)) -> Vec<u8> {
     let mut bytes = file.to_vec();
     for edit in edits {
         match edit {
@@ -186,4 +187,78 @@ fn slots(file: &[u8]) -> Vec<std::ops::Range<usize>> {
     let of_states = slots.iter().filter(|slot| slot.start < first).count();
     assert!(of_states == 4 && slots.len() > 4, "{slots:?}");
     slots
+}
+
+const KEYFRAMES: usize = 4;
+/// The header of a record: its number, its length, and the checksums of its bytes and of the
+/// header.
+const HEADER: usize = 20;
+
+fn keyframe(seq: usize) -> Keyframe {
+    Keyframe {
+        seq: seq as u64,
+        scan: seq as u64,
+        stamp_ns: 0,
+        pose: UncertainMotion::identity(),
+        motion: UncertainMotion::identity(),
+        noise: UncertainMotion::identity().covariance,
+        twist: Twist::default(),
+        path_m: 0.0,
+        points: vec![SparsePoint::default(); 4],
+    }
+}
+
+/// Reads all keyframes, cuts the torn end, and continues.
+fn use_log(out: &Path) -> Result<(), Failure> {
+    let mut reader = RecordReader::open(out)?;
+    let found = reader.len();
+    let read: Result<Vec<Keyframe>, _> = (0..found).map(|index| reader.read(index)).collect();
+    let mut log = RecordLog::open(out)?;
+    assert_eq!(log.len(), found);
+    log.cut(found)?;
+    log.append(&keyframe(found))?;
+    assert_eq!(reader.refresh()?, found + 1);
+    assert_eq!(reader.read(found)?, keyframe(found));
+    read?;
+    Ok(())
+}
+
+/// Changes a word of a record or of its header, and mends their checksums.
+fn change(record: &mut [u8], at: usize, number: u64) {
+    let (header, content) = record.split_at_mut(HEADER);
+    let places = MAGIC + content.len() - 8;
+    match at % places {
+        at if at < 8 => header[at..at + 8].copy_from_slice(&number.to_le_bytes()),
+        at => {
+            let at = (at - 8).min(content.len() - 8);
+            content[at..at + 8].copy_from_slice(&number.to_le_bytes());
+            header[12..16].copy_from_slice(&crc32fast::hash(content).to_le_bytes());
+        }
+    }
+    let check = crc32fast::hash(&header[..16]);
+    header[16..].copy_from_slice(&check.to_le_bytes());
+}
+
+#[test]
+fn keyframe_logs() {
+    let (target, folder) = (Target::new(16), folder());
+    let path = records_path::<Keyframe>(folder.path());
+    let mut log = RecordLog::open(folder.path()).unwrap();
+    (0..KEYFRAMES).for_each(|seq| log.append(&keyframe(seq)).unwrap());
+    log.end().unwrap();
+    drop(log);
+    let valid = fs::read(&path).unwrap();
+    let record = (valid.len() - MAGIC - HEADER) / KEYFRAMES;
+    use_log(folder.path()).unwrap();
+    let word = |bytes: &mut [u8], index: usize, at: usize, number: u64| {
+        let records = bytes.get_mut(MAGIC..).unwrap_or_default();
+        let record = records.chunks_exact_mut(record).nth(index % KEYFRAMES);
+        record
+            .map(|record| change(record, at, number))
+            .unwrap_or_default();
+    };
+    check!().with_type::<Vec<Edit>>().for_each(|edits| {
+        fs::write(&path, edited(&valid, edits, word)).unwrap();
+        target.run(|| use_log(folder.path()));
+    });
 }

@@ -4,10 +4,8 @@
 
 mod bags;
 mod files;
-mod keyframes;
 mod messages;
 mod recordings;
 mod runs;
-mod simulations;
 mod streams;
 mod texts;

@@ -1,4 +1,5 @@
-//! Texts: trajectories, configurations, model cards, the results of a run.
+//! Texts: trajectories, configurations (a recording keeps that of a simulation beside its images),
+//! model cards, the results of a run.
 
 use std::{
     fs,
@@ -7,7 +8,7 @@ use std::{
 
 use bolero::check;
 use gyre_configuration::Configuration;
-use gyre_datasets::{ground_truth::parse_trajectory, write_tum};
+use gyre_datasets::{ImageSource as _, ground_truth::parse_trajectory, write_tum};
 use gyre_fuzz::{
     Failure, Target,
     edit::{TextEdit, edit_text},
@@ -16,6 +17,7 @@ use gyre_masking::{MaskKind, MaskingConfig, model::Model};
 use gyre_matching::odometry::Odometry;
 use gyre_radar::RasterConfig;
 use gyre_results::{judgement::judge, odometry};
+use gyre_simulator::{SimulatedDrive, SimulationConfig};
 
 use crate::recordings::folder;
 
@@ -159,4 +161,34 @@ fn texts_without_edits_are_accepted() {
         use_trajectory(text).unwrap();
     }
     assert!(configurations().len() > 5);
+}
+
+/// Images up to this size are drawn, bytes.
+const LARGEST_IMAGE: usize = 1 << 20;
+
+/// Builds the town and draws the first scan.
+fn use_simulation(text: &str) -> Result<(), Failure> {
+    let config: SimulationConfig =
+        toml::from_str(text).map_err(|error| error.message().to_owned())?;
+    let drive = SimulatedDrive::new(&config)?;
+    let bytes = drive.image_size().bytes();
+    assert!(drive.scans() > 0);
+    if bytes <= LARGEST_IMAGE {
+        drive.renderer().draw(0, &mut vec![0; bytes]);
+    }
+    Ok(())
+}
+
+#[test]
+fn simulations() {
+    let target = Target::new(512);
+    let config = SimulationConfig {
+        scans: Some(1),
+        ..SimulationConfig::default()
+    };
+    let text = toml::to_string(&config).unwrap();
+    use_simulation(&text).unwrap();
+    check!()
+        .with_type::<Vec<TextEdit>>()
+        .for_each(|edits| target.run(|| use_simulation(&edit_text(&text, edits))));
 }

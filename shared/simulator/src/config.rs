@@ -1,18 +1,22 @@
+use std::path::PathBuf;
+
 use gyre_datasets::DatasetOptions;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    drive::DriveConfig,
     error::SimulatorError,
     gnss::SimulatedGnssConfig,
     gyro::SimulatedGyroConfig,
     output::{OutputConfig, OutputFormat},
+    path::{BlockLoop, Path, recorded},
     sensor::SensorConfig,
     wheels::SimulatedWheelsConfig,
 };
 
 pub(crate) const MAX_SCANS: usize = 100_000;
+/// Lateral acceleration in the bends of a block, metres a second squared, which limits the speed.
+const LATERAL_MPS2: f64 = 5.0;
 
 /// The errors of the radar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -152,5 +156,44 @@ impl SimulationConfig {
             encoder_counts: with_encoder.then_some(sampling.encoder_counts),
             ..DatasetOptions::default()
         }
+    }
+}
+
+/// The path of the vehicle: laps around a block of houses, or a recorded trajectory.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriveConfig {
+    /// Length and width of the block from street centre to street centre, metres.
+    pub block_m: [f64; 2],
+    /// Speed on the straights of the block, metres a second.
+    pub speed_mps: f64,
+    /// A trajectory to drive along instead, in any format that `gyre evaluate` reads. Poses without
+    /// times are one sweep apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Start in the file, seconds after its first pose.
+    pub from_s: f64,
+}
+
+impl Default for DriveConfig {
+    fn default() -> Self {
+        Self {
+            block_m: [40.0, 32.0],
+            speed_mps: 9.5,
+            file: None,
+            from_s: 0.0,
+        }
+    }
+}
+
+impl DriveConfig {
+    /// Builds the path, for a radar with so many sweeps a second.
+    pub fn path(&self, rate_hz: f64) -> Result<Box<dyn Path>, SimulatorError> {
+        let [length_m, width_m] = self.block_m;
+        let Some(file) = &self.file else {
+            let block = BlockLoop::new(length_m, width_m, self.speed_mps, LATERAL_MPS2);
+            return Ok(Box::new(block));
+        };
+        Ok(Box::new(recorded::read(file, self.from_s, rate_hz)?))
     }
 }

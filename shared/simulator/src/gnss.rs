@@ -7,7 +7,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{episodes::Episodes, path::Path, stream::Stream};
+use crate::{
+    simulator::Simulator,
+    stream::{Episodes, Stream},
+};
 
 pub(crate) const FILE: &str = "gnss.csv";
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";
@@ -36,14 +39,10 @@ pub struct SimulatedGnssConfig {
     pub faults: bool,
 }
 
-/// The fixes during a drive along a path, which starts at a time and lasts for a duration, by their
-/// stamps. `None` without a receiver.
-pub(crate) fn fixes(
-    config: &SimulatedGnssConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<RawFix>> {
+/// The fixes during a drive, by their stamps. `None` without a receiver.
+pub(crate) fn fixes(simulator: &Simulator) -> Option<Vec<RawFix>> {
+    let (config, seed) = (&simulator.config().gnss, simulator.config().seed);
+    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
     (config.rate_hz > 0.0).then(|| {
         let plane = LocalPlane::new(ORIGIN, 0.0);
         let mut rng = Stream::GNSS_ERRORS.generator(seed);
@@ -87,17 +86,7 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{SimulationConfig, simulator::Simulator};
-
-    fn fixes_of(simulator: &Simulator) -> Option<Vec<RawFix>> {
-        let config = simulator.config();
-        fixes(
-            &config.gnss,
-            config.seed,
-            simulator.path(),
-            simulator.span(),
-        )
-    }
+    use crate::SimulationConfig;
 
     #[test]
     fn fixes_err_by_as_much_as_they_say_and_holes_have_none() {
@@ -112,7 +101,7 @@ mod tests {
                 ..SimulationConfig::default()
             };
             let simulator = Simulator::new(&config).expect("a drive");
-            let fixes = fixes_of(&simulator).unwrap_or_default();
+            let fixes = fixes(&simulator).unwrap_or_default();
             (simulator, fixes)
         };
         let (simulator, fixes) = simulated(false);
@@ -129,6 +118,6 @@ mod tests {
         let holes = simulated(true).1.len();
         assert!((1200..1300).contains(&holes), "{holes}");
         let without = Simulator::new(&SimulationConfig::default()).expect("a drive");
-        assert_eq!(fixes_of(&without), None);
+        assert_eq!(super::fixes(&without), None);
     }
 }

@@ -1,16 +1,16 @@
 //! A simulated drive in a dataset format: images with their names, side files and ground truth. It
 //! can be written to a disk or streamed into a pipeline.
 
-mod render_ahead;
-
-use std::path::PathBuf;
+use std::{
+    collections::VecDeque,
+    mem,
+    path::PathBuf,
+    thread::{self, JoinHandle},
+};
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
-use gyre_geometry::{
-    OwnedScan, ScanSlot,
-    samples::{RawFix, Sample},
-};
-use render_ahead::Ahead;
+use gyre_geometry::{OwnedScan, ScanSlot, samples::Sample};
+use gyre_radar::Trajectory;
 
 use crate::{
     cars,
@@ -18,13 +18,18 @@ use crate::{
     error::SimulatorError,
     gnss,
     gyro::log,
-    layout::{SideFile, boreas, oxford, radiate},
+    layout::{self, radiate},
     output::OutputFormat,
     profile::{Chirp, METADATA_BYTES},
     sensor::Sensor,
     simulator::Simulator,
-    truth, wheels,
+    wheels,
 };
+
+/// Images that are rendered ahead of the reader, which bounds the memory.
+const AHEAD: usize = 6;
+/// The renderers yield to the stages: on a vehicle the radar does their work.
+const NICENESS: i32 = 10;
 
 #[derive(Clone)]
 pub struct SimulatedDrive {
@@ -77,8 +82,10 @@ impl SimulatedDrive {
 
     pub fn image_name(&self, index: usize) -> String {
         match self.output {
-            OutputFormat::Oxford => oxford::file_name(&self.simulator, index),
-            OutputFormat::Boreas => boreas::file_name(&self.simulator, index),
+            OutputFormat::Oxford => format!("{}.png", self.simulator.time(index).start_us),
+            OutputFormat::Boreas => {
+                format!("{}.png", layout::boreas_stamp_us(&self.simulator, index))
+            }
             OutputFormat::Radiate => radiate::file_name(index),
         }
     }
@@ -99,7 +106,7 @@ impl SimulatedDrive {
             OutputFormat::Oxford => {
                 (time.start_us + time.stamp_us(self.simulator.sampling().azimuths - 1)) * 500
             }
-            OutputFormat::Boreas => boreas::stamp_us(&self.simulator, index) * 1000,
+            OutputFormat::Boreas => layout::boreas_stamp_us(&self.simulator, index) * 1000,
             OutputFormat::Radiate => radiate::stamp_ns(&self.simulator, index),
         }
     }
@@ -111,38 +118,47 @@ impl SimulatedDrive {
     }
 
     pub fn ground_truth_tum(&self) -> Vec<u8> {
-        truth::ground_truth_tum(&self.simulator, self.stamps_ns())
+        let (simulator, stamps_ns) = (&self.simulator, self.stamps_ns());
+        let pose = |stamp_ns: &i64| simulator.path().pose(simulator.drive_time_s(*stamp_ns));
+        let poses = stamps_ns.iter().map(pose).collect();
+        let stamp_ns = Some(stamps_ns);
+        let mut text = Vec::new();
+        // Writing to memory cannot fail, and there are stamps.
+        let _ = gyre_datasets::write_tum(&Trajectory { stamp_ns, poses }, &mut text);
+        text
     }
 
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
     /// `imu.csv` has them. `None` without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        log::samples(&config.gyro, config.seed, path, self.simulator.span())
+        log::samples(&self.simulator)
     }
 
     /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
     /// that measure.
     pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        wheels::samples(&config.wheels, config.seed, path, self.simulator.span())
+        wheels::samples(&self.simulator)
     }
 
-    fn fixes(&self) -> Option<Vec<RawFix>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        gnss::fixes(&config.gnss, config.seed, path, self.simulator.span())
-    }
-
-    pub(crate) fn side_files(&self) -> Vec<SideFile> {
+    pub(crate) fn side_files(&self) -> Vec<(&'static str, String)> {
         let simulator = &self.simulator;
         let mut files = match self.output {
-            OutputFormat::Oxford => oxford::side_files(simulator),
-            OutputFormat::Boreas => boreas::side_files(simulator),
+            OutputFormat::Oxford => vec![
+                ("radar.timestamps", layout::oxford_timestamps(simulator)),
+                (
+                    "gt/radar_odometry.csv",
+                    layout::oxford_odometry_csv(simulator),
+                ),
+            ],
+            OutputFormat::Boreas => vec![(
+                "applanix/radar_poses.csv",
+                layout::boreas_poses_csv(simulator),
+            )],
             OutputFormat::Radiate => Vec::new(),
         };
         let truth = String::from_utf8_lossy(&self.ground_truth_tum()).into_owned();
         files.push(("ground_truth.tum", truth));
-        let objects = truth::objects_csv(simulator, &self.stamps_ns());
+        let objects = cars::objects_csv(simulator, &self.stamps_ns());
         files.push((cars::FILE, objects));
         let logs = [
             ("Navtech_Polar.txt", self.stamps()),
@@ -151,7 +167,7 @@ impl SimulatedDrive {
                 wheels::FILE,
                 self.wheel_samples().map(|it| wheels::csv(&it)),
             ),
-            (gnss::FILE, self.fixes().map(|it| gnss::csv(&it))),
+            (gnss::FILE, gnss::fixes(simulator).map(|it| gnss::csv(&it))),
         ];
         files.extend(
             logs.into_iter()
@@ -271,6 +287,74 @@ impl ImageSource for Renderer {
         let ahead = self.ahead.as_mut();
         if !ahead.is_some_and(|ahead| ahead.take(&self.drive, index, pixels)) {
             self.render(index, pixels);
+        }
+    }
+}
+
+/// The images ahead of a reader, each rendered by a thread. They may be read in any order;
+/// consecutive ones are fast. Since an image depends on its number alone, threads and their timing
+/// change nothing.
+#[derive(Default)]
+struct Ahead {
+    coming: VecDeque<(usize, JoinHandle<Vec<u8>>)>,
+    /// A reader may need the first image only to inspect the recording.
+    looked: bool,
+}
+
+impl Ahead {
+    /// Copies image `index` to `pixels` as soon as it is rendered; false if the reader renders the
+    /// image itself.
+    pub fn take(&mut self, drive: &SimulatedDrive, index: usize, pixels: &mut [u8]) -> bool {
+        if !mem::replace(&mut self.looked, true) {
+            return false;
+        }
+        let goes_on = self.coming.front().is_some_and(|(at, _)| *at <= index);
+        for (at, image) in mem::take(&mut self.coming) {
+            match goes_on && at >= index {
+                true => self.coming.push_back((at, image)),
+                // Waits, or a reader that jumps would start ever more threads.
+                false => drop(image.join()),
+            }
+        }
+        let next = self.coming.back().map_or(index, |(last, _)| last + 1);
+        for at in next..(index + AHEAD).min(drive.scans()) {
+            self.coming.push_back((at, start(drive.clone(), at)));
+        }
+        let rendered = self.coming.pop_front().map(|(_, image)| image.join());
+        if let Some(Ok(image)) = &rendered {
+            pixels.copy_from_slice(image);
+        }
+        matches!(rendered, Some(Ok(_)))
+    }
+}
+
+fn start(drive: SimulatedDrive, index: usize) -> JoinHandle<Vec<u8>> {
+    thread::spawn(move || {
+        // On Linux this concerns this thread alone.
+        let _ = rustix::process::nice(NICENESS);
+        let mut pixels = vec![0; drive.image_size().bytes()];
+        drive.renderer().draw(index, &mut pixels);
+        pixels
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_read_in_any_order_are_those_rendered_alone() {
+        let drive = SimulatedDrive::new(&SimulationConfig {
+            scans: Some(12),
+            ..SimulationConfig::default()
+        })
+        .unwrap();
+        let (mut ahead, mut alone) = (drive.renderer_ahead(), drive.renderer());
+        let (mut a, mut b) = (vec![0; ahead.size().bytes()], vec![0; ahead.size().bytes()]);
+        for index in [0, 0, 1, 2, 9, 10, 3, 3, 5, 11] {
+            ahead.draw(index, &mut a);
+            alone.draw(index, &mut b);
+            assert!(a == b, "image {index}");
         }
     }
 }

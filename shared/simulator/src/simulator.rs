@@ -14,7 +14,6 @@ use crate::{
     route::Route,
     scenery,
     sensor::{Scene, Sensor, SweepTime},
-    tunnel,
     world::World,
 };
 
@@ -49,7 +48,7 @@ impl Simulator {
         let route = Route::along(path.as_ref());
         let mut scenery = scenery::build(&route, config.seed);
         if let Some(tunnel_m) = config.tunnel_m {
-            tunnel::build(tunnel_m, &mut scenery, &route, config.seed)?;
+            scenery::build_tunnel(tunnel_m, &mut scenery, &route, config.seed)?;
         }
         Ok(Self {
             config: config.clone(),

@@ -10,7 +10,7 @@ use gyre_simulator::{
     output::OutputConfig, write_dataset,
 };
 
-use crate::common::all_files;
+use crate::all_files;
 
 const FORMATS: [OutputFormat; 3] = [
     OutputFormat::Oxford,

@@ -15,14 +15,16 @@
 //! messages: each has the number of its first bin, and repeats angle, time and description.
 //! [`Datagrams`] puts them together.
 
-mod assembly;
 mod datagrams;
 mod write;
 
 pub use datagrams::Datagrams;
 pub use write::{MAX_DATAGRAM_BYTES, write_azimuth, write_description};
 
-use crate::{configuration::Configuration, malformed::Malformed, message::MAX_PAYLOAD_BYTES};
+use crate::{
+    configuration::Configuration,
+    message::{MAX_PAYLOAD_BYTES, Malformed},
+};
 
 /// The category of ASTERIX: the first byte of a message.
 const CATEGORY: u8 = 240;

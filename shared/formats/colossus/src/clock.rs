@@ -3,8 +3,7 @@
 use std::{fmt, iter};
 
 use crate::configuration::Configuration;
-use crate::kept::KeptAzimuth;
-use crate::message::Azimuth;
+use crate::message::{Azimuth, KeptAzimuth};
 
 const SECOND_NS: i64 = 1_000_000_000;
 /// 2001-01-01 and 2101-01-01, s since 1970. A radar whose clock was never set counts from 1970 or

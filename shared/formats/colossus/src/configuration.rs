@@ -4,7 +4,7 @@ use gyre_geometry::MAX_AZIMUTHS;
 use thiserror::Error;
 
 use crate::{
-    malformed::{Malformed, head},
+    message::{Malformed, head},
     protobuf::fields,
 };
 

@@ -4,7 +4,6 @@
 
 use crate::configuration::{self, Configuration};
 use crate::health::{self, Health};
-use crate::malformed::{Malformed, head};
 
 pub const PORT: u16 = 6317;
 /// The largest payload, bytes.
@@ -154,4 +153,61 @@ fn azimuth<'a>(
         split_seconds: [p0, p1, p2, p3],
         powers: powers(bytes),
     })
+}
+
+/// A payload that does not fit its message, or a datagram that is no part of an azimuth: a
+/// sentence.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Malformed(String);
+
+impl Malformed {
+    pub(crate) fn new(sentence: impl Into<String>) -> Self {
+        Self(sentence.into())
+    }
+}
+
+pub(crate) fn head<const N: usize>(message: &str, payload: &[u8]) -> Result<[u8; N], Malformed> {
+    payload.first_chunk().copied().ok_or_else(|| {
+        let actual = payload.len();
+        Malformed::new(format!(
+            "the payload of {message} has {actual} bytes, expected at least {N}"
+        ))
+    })
+}
+
+/// An azimuth that outlives the buffer it was received in.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct KeptAzimuth {
+    sweep_counter: u16,
+    encoder: u16,
+    seconds: [u8; 4],
+    split_seconds: [u8; 4],
+    sixteen: bool,
+    powers: Vec<u8>,
+}
+
+impl KeptAzimuth {
+    pub(crate) fn keep(&mut self, azimuth: &Azimuth<'_>) {
+        self.sweep_counter = azimuth.sweep_counter;
+        self.encoder = azimuth.encoder;
+        self.seconds = azimuth.seconds;
+        self.split_seconds = azimuth.split_seconds;
+        self.sixteen = matches!(azimuth.powers, Powers::Sixteen(_));
+        self.powers.clear();
+        self.powers.extend_from_slice(azimuth.powers.bytes());
+    }
+
+    pub(crate) fn azimuth(&self) -> Azimuth<'_> {
+        Azimuth {
+            sweep_counter: self.sweep_counter,
+            encoder: self.encoder,
+            seconds: self.seconds,
+            split_seconds: self.split_seconds,
+            powers: match self.sixteen {
+                true => Powers::Sixteen(&self.powers),
+                false => Powers::Eight(&self.powers),
+            },
+        }
+    }
 }

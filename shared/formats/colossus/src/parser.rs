@@ -2,8 +2,9 @@
 
 use thiserror::Error;
 
-use crate::malformed::Malformed;
-use crate::message::{HEADER_BYTES, MAX_PAYLOAD_BYTES, Message, SIGNATURE, VERSION, decode};
+use crate::message::{
+    HEADER_BYTES, MAX_PAYLOAD_BYTES, Malformed, Message, SIGNATURE, VERSION, decode,
+};
 
 /// The most bytes that [`Parser::space`] promises.
 pub const MAX_SPACE_BYTES: usize = 1 << 16;

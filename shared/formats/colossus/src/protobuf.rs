@@ -1,6 +1,6 @@
 //! The fields of a protobuf.
 
-use crate::malformed::Malformed;
+use crate::message::Malformed;
 
 /// The wire type of a float.
 pub(crate) const FOUR_BYTES: u64 = 5;

@@ -1,8 +1,6 @@
 //! Azimuths to scans, whose angles, times and scales equal a recording of the same azimuths, to the
 //! bit.
 
-mod counters;
-mod powers;
 mod rows;
 mod seam;
 
@@ -13,10 +11,8 @@ use gyre_geometry::{ScanLimits, ScanSlot, Sense, SweepGeometry};
 
 use crate::{
     configuration::{BadConfiguration, Configuration},
-    kept::KeptAzimuth,
-    message::Azimuth,
+    message::{Azimuth, KeptAzimuth},
 };
-pub use counters::Counters;
 use rows::{Empty, RowWriter};
 use seam::{Grid, Seam};
 
@@ -25,6 +21,28 @@ pub struct Sweep {
     pub geometry: SweepGeometry,
     /// Azimuths that did not arrive. Their powers are 0, and their flag is not `MEASURED`.
     pub missing: usize,
+}
+
+/// Counts of losses, drops and changes since the start of a stream.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    pub sweeps: u64,
+    /// Azimuths that did not arrive, of the sweeps returned.
+    pub missing_azimuths: u64,
+    /// Sweeps dropped because more than half of their azimuths did not arrive.
+    pub incomplete_sweeps: u64,
+    /// Sweeps dropped because a turn or more is missing in the middle, or the radar's clock was
+    /// set. One each, however many turns are missing: turns without an azimuth are not counted
+    /// here.
+    pub broken_sweeps: u64,
+    /// Azimuths dropped because their sweep was complete.
+    pub surplus_azimuths: u64,
+    /// Azimuths dropped because they have the encoder count of the azimuth before.
+    pub repeated_azimuths: u64,
+    /// Azimuths dropped because their encoder count is beyond a turn.
+    pub invalid_azimuths: u64,
+    /// Rows with more bins than configured, cut.
+    pub cut_rows: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

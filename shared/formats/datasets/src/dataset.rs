@@ -1,18 +1,12 @@
-//! Readers of radar recordings: one trait, one file per format.
+//! Readers of radar recordings: one trait for all formats.
 
-mod dataset_toml;
 mod detect;
-mod eccentricity;
 mod encoder;
 mod error;
 mod first_image;
 mod format;
 mod image_list;
-mod image_size;
-mod image_source;
 mod images;
-mod mulran;
-mod navtech_notes;
 mod navtech_png;
 mod navtech_scans;
 mod options;
@@ -21,7 +15,6 @@ mod profiles;
 mod radiate;
 mod row_order;
 mod sensor_clock;
-mod stale;
 pub(crate) mod stamp;
 mod transposed;
 
@@ -31,19 +24,18 @@ use std::{
 };
 
 use gyre_geometry::{
+    OwnedScan,
     samples::{BagFixes, Sample, SampleKind},
     scan::{ScanLimits, ScanSlot, SweepGeometry},
 };
+use gyre_radar::{NoDoppler, check_chirps};
 
-pub use dataset_toml::stored_options;
 pub use detect::is_dataset;
-pub use eccentricity::correct_eccentricity;
-pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
+pub use encoder::{EncoderTurn, FIRST_TURNS, correct_eccentricity, encoder_counts};
 pub use error::{OpenError, ReadError};
 pub use format::Format;
-pub use image_size::ImageSize;
-pub use image_source::ImageSource;
-pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
+pub use images::{ImageSize, ImageSource};
+pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption, stored_options};
 pub use radiate::frame_stamps;
 pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns, turn_ns};
 
@@ -232,7 +224,7 @@ fn open_found(
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check_without_topics(found.format)?;
     Ok(match found.format {
-        Format::Mulran => Box::new(mulran::open(found, options)?),
+        Format::Mulran => Box::new(transposed::open_mulran(found, options)?),
         Format::Radiate => Box::new(radiate::open(found, options)?),
         format => match profiles::Profile::of(format) {
             Some(profile) => Box::new(navtech_scans::NavtechScans::open(found, options, profile)?),
@@ -243,4 +235,15 @@ fn open_found(
             }
         },
     })
+}
+
+/// Checks by the first scan of a recording that its radar measures the velocity by Doppler: see
+/// [`check_chirps`]. A scan that cannot be read is reported where it is played.
+pub fn check_first_scan(dataset: &mut dyn Dataset) -> Result<(), NoDoppler> {
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    let Ok(geometry) = dataset.read(dataset.first(), scan.slot()) else {
+        return Ok(());
+    };
+    scan.geometry = geometry;
+    check_chirps(&scan.view())
 }

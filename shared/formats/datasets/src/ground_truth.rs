@@ -1,17 +1,13 @@
 //! Trajectory files: the ground truth of each dataset, and the common pose formats.
 
-mod boreas;
-mod kitti;
-mod mulran;
-mod oxford;
-mod plane;
-mod tum;
+mod poses;
+mod tables;
 
 use std::path::{Path, PathBuf};
 
-pub use kitti::write_kitti;
-pub use tum::{write_tum, write_tum_pose};
+pub use poses::{write_kitti, write_tum, write_tum_pose};
 
+use gyre_geometry::Pose;
 use gyre_radar::trajectory::Trajectory;
 use gyre_storage::quoted;
 
@@ -128,11 +124,11 @@ fn detect(text: &str) -> Result<Parse, String> {
     let columns = commas.max(words);
     match (commas, words) {
         _ if first.contains(';') => Err(SEPARATORS.to_owned()),
-        _ if first.contains("destination_timestamp") => Ok(oxford::parse),
-        _ if boreas::TIMES.iter().any(|name| first.contains(name)) => Ok(boreas::parse),
-        (13, 1 | 13) => Ok(mulran::parse),
-        (1, 8) => Ok(tum::parse),
-        (1, 12 | 13) => Ok(kitti::parse),
+        _ if first.contains("destination_timestamp") => Ok(tables::oxford),
+        _ if tables::TIMES.iter().any(|name| first.contains(name)) => Ok(tables::boreas),
+        (13, 1 | 13) => Ok(tables::mulran),
+        (1, 8) => Ok(poses::tum),
+        (1, 12 | 13) => Ok(poses::kitti),
         _ => Err(format!(
             "its first line has {columns} columns: {SEPARATORS}"
         )),
@@ -227,4 +223,11 @@ fn stamped<'a, T>(
         values.push(value);
     }
     Ok((stamps, values))
+}
+
+fn timed((stamps, poses): (Vec<i64>, Vec<Pose>)) -> Trajectory {
+    Trajectory {
+        stamp_ns: Some(stamps),
+        poses,
+    }
 }

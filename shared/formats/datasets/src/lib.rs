@@ -1,11 +1,9 @@
-//! Recordings of radars on disk, and what lies beside them: one file per format. Begin with
+//! Recordings of radars on disk, and what lies beside them. Begin with
 //! [`mod@dataset`]: the scans of a recording behind one trait.
 
 pub mod dataset;
 pub mod fingerprint;
-mod first_scan;
 mod gnss_log;
-mod gps_imu_twist;
 pub mod ground_truth;
 mod gyro_log;
 mod header;
@@ -13,18 +11,16 @@ mod inspect;
 mod logs;
 mod plain_words;
 mod scan_samples;
-mod stretches;
 mod table;
 mod wheel_log;
 
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, Format,
-    ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError,
+    ImageSize, ImageSource, LostAzimuthOption, OpenError, Properties, ReadError, check_first_scan,
     correct_eccentricity, encoder_counts, frame_stamps, is_dataset, middle_ns, open, open_resolved,
     open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
-pub use first_scan::check_first_scan;
 pub use gnss_log::{GnssFaults, GnssLog, LoggedFix, ReceivedFixes};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,

@@ -214,13 +214,11 @@ fn between(samples: &[Sample], after_ns: i64, until_ns: i64) -> &[Sample] {
 
 #[cfg(test)]
 mod tests {
-    use gyre_geometry::samples::UpAxis;
+    use gyre_geometry::samples::UpAxis::{MinusX, MinusY, MinusZ, X, Y, Z};
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     use super::*;
-
-    use UpAxis::{MinusX, MinusY, MinusZ, X, Y, Z};
-    const AXES: [UpAxis; 6] = [X, MinusX, Y, MinusY, Z, MinusZ];
 
     /// Samples of these stamps, in any order.
     fn of(mut stamps: Vec<i64>) -> Vec<Sample> {
@@ -247,34 +245,22 @@ mod tests {
         }
     }
 
-    fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    }
-
     /// Whatever axis points up, the third rate is the rate about it, and the axes stay
     /// right-handed.
     #[test]
     fn the_axes_are_right_handed() {
-        for up in AXES {
-            let [x, y, z] =
-                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| up.in_vehicle(axis));
-            assert_eq!(cross(x, y), z, "{up:?}");
-            let axis = ["x", "y", "z"]
-                .iter()
-                .position(|axis| up.name().ends_with(axis));
-            let about = [x, y, z][axis.unwrap()][2];
-            assert_eq!(
-                about,
-                if up.name().starts_with('-') {
-                    -1.0
-                } else {
-                    1.0
-                }
-            );
+        for (up, [axis, sign]) in [
+            (X, [0, 1]),
+            (MinusX, [0, -1]),
+            (Y, [1, 1]),
+            (MinusY, [1, -1]),
+            (Z, [2, 1]),
+            (MinusZ, [2, -1]),
+        ] {
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+            let [x, y, z] = axes.map(|axis| Vector3::from(up.in_vehicle(axis.into())));
+            assert_eq!(x.cross(&y), z, "{up:?}");
+            assert_eq!([x, y, z][axis as usize].z, f64::from(sign), "{up:?}");
         }
     }
 

@@ -4,7 +4,6 @@
 
 mod common;
 
-mod frames;
 mod gnss_logs;
 mod gyro_logs;
 mod inspect;

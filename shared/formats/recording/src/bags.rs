@@ -3,15 +3,11 @@
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
 
-mod azimuths;
 mod bag;
 mod files;
-mod fixes;
 mod radar;
-mod samples;
 mod scans;
 mod sensors;
-mod spans;
 mod topics;
 mod writer;
 
@@ -21,6 +17,6 @@ use crate::{
 };
 
 pub use files::is_bag;
-pub use fixes::fixes;
 pub use scans::{open, reopen};
+pub use sensors::fixes;
 pub use writer::{BagWriter, Kept, Topic};

@@ -6,7 +6,6 @@
 //! are compressed, and no damage is a panic.
 
 mod parse;
-mod records;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -23,7 +22,7 @@ use mcap::{
 };
 
 use crate::RecordingError;
-use parse::{Field, fields};
+use parse::{Field, fields, records};
 pub(crate) use parse::{next, parse};
 
 /// Bytes of opcode and length before each record.
@@ -205,7 +204,7 @@ impl McapFile {
             true => Err(McapError::ChunkTooLarge(span.bytes)),
             false => {
                 let bytes = self.content(span)?;
-                records::records(&bytes, |record| {
+                records(&bytes, |record| {
                     self.learn(record, &wanted).map_or(0, |message| {
                         let kept = size_of::<Message>() + message.data.len();
                         messages.push(message);

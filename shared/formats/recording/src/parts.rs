@@ -4,11 +4,19 @@
 
 use std::{
     collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
+    fs, io,
+    path::{self, Path, PathBuf},
 };
 
-use crate::newest::head;
+use bytemuck::pod_read_unaligned;
+use gyre_contract::Item;
+use gyre_storage::SETTINGS;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Entry, Head, Incoming, Positions, RecordingError, RecordingWriter,
+    head::{head, newest},
+};
 
 /// Returns the path of a part, from 1.
 pub(crate) fn part(path: &Path, number: usize) -> PathBuf {
@@ -87,10 +95,158 @@ pub fn next_part(path: &Path, after: usize) -> usize {
     numbers(path).last().map_or(after, |last| after.max(*last)) + 1
 }
 
+/// When a file is ended. The limits are checked before each message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Split {
+    /// The size, bytes; `None`: any. A file is larger by at most a chunk and its summary.
+    pub bytes: Option<u64>,
+    /// Time from its first to its newest scan on the sensor's clock, ns; `None`: any.
+    pub span_ns: Option<i64>,
+}
+
+pub struct SplitWriter {
+    /// The first part.
+    to: PathBuf,
+    head: Head,
+    split: Split,
+    /// The part that is being written, for records that are not messages.
+    pub file: RecordingWriter,
+    /// Stores the parts; `None` for a recording that nobody continues.
+    ledger: Option<Ledger>,
+    /// The positions behind all that was added.
+    positions: Positions,
+}
+
+impl SplitWriter {
+    /// Begins the part of the recording `to` given by `head`, behind `positions`.
+    pub fn create(
+        to: PathBuf,
+        head: Head,
+        split: Split,
+        ledger: Option<Ledger>,
+        positions: Positions,
+    ) -> Result<Self, RecordingError> {
+        if let Some(ledger) = &ledger {
+            ledger.note(&to, &head, &positions)?;
+        }
+        Ok(Self {
+            file: RecordingWriter::create(&part(&to, head.part), &head)?,
+            to,
+            head,
+            split,
+            ledger,
+            positions,
+        })
+    }
+
+    /// Adds a message, to the next part if this one is full.
+    pub fn add(&mut self, message: &Incoming) -> Result<(), RecordingError> {
+        let Split { bytes, span_ns } = self.split;
+        let is_full = bytes.is_some_and(|bytes| self.file.bytes() >= bytes)
+            || span_ns.is_some_and(|span_ns| self.file.span_ns() >= span_ns);
+        if is_full {
+            self.go_on()?;
+        }
+        self.file.add(message)?;
+        if let Some(item) = message.header.get(..size_of::<Item>()) {
+            let position = self.positions.entry(message.topic.to_owned()).or_default();
+            position.pass(&Entry::of(&pod_read_unaligned(item)));
+        }
+        Ok(())
+    }
+
+    /// Ends the file and begins the next one. The ledger has no message that is not written, and
+    /// each number before there is a file of it.
+    fn go_on(&mut self) -> Result<(), RecordingError> {
+        self.file.end()?;
+        self.head.part = next_part(&self.to, self.head.part);
+        if let Some(ledger) = &self.ledger {
+            ledger.note(&self.to, &self.head, &self.positions)?;
+        }
+        let next = part(&self.to, self.head.part);
+        self.file.go_on(&next, &self.head)
+    }
+}
+
+/// The newest part of a recording, and what all parts before it hold.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Begun {
+    to: PathBuf,
+    pub id: String,
+    pub part: usize,
+    /// The positions behind the parts before it.
+    pub positions: Positions,
+}
+
+/// The ledger of a recording: the information for the next recorder of its run, even if the earlier
+/// parts have been moved away. It is kept with the journal of the run, and read instead of the
+/// parts.
+#[derive(Clone, Debug)]
+pub struct Ledger(PathBuf);
+
+impl Ledger {
+    pub fn of(out: &Path) -> Self {
+        Self(out.join("journal").join("recording.toml"))
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Reads the ledger of an earlier recorder that writes to `to`, with the positions behind its
+    /// newest part. Unreadable content of a part counts as missed.
+    pub fn read(&self, to: &Path) -> Result<Option<Begun>, RecordingError> {
+        let text = match gyre_storage::read_text(&self.0, SETTINGS) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            read => read.map_err(|source| self.failed(source))?,
+        };
+        let mut begun: Begun = toml::from_str(&text)
+            .map_err(|error| self.failed(io::Error::other(error.message().to_owned())))?;
+        let is_of_it = |path: PathBuf| head(&path).is_some_and(|head| head.id == begun.id);
+        // Under another name too: on a disk that is mounted elsewhere, by a link.
+        if begun.to != self.absolute(to)? && !parts(to).into_iter().any(is_of_it) {
+            return Ok(None);
+        }
+        if let Ok((head, passed)) = newest(&part(to, begun.part))
+            && head.id == begun.id
+        {
+            for (topic, position) in passed {
+                let known = begun.positions.entry(topic).or_default();
+                if (position.generation, position.next) > (known.generation, known.next) {
+                    *known = position;
+                }
+            }
+        }
+        Ok(Some(begun))
+    }
+
+    /// Notes that a part is begun. The note survives a power failure.
+    fn note(&self, to: &Path, head: &Head, positions: &Positions) -> Result<(), RecordingError> {
+        let begun = Begun {
+            to: self.absolute(to)?,
+            id: head.id.clone(),
+            part: head.part,
+            positions: positions.clone(),
+        };
+        let text = toml::to_string(&begun).map_err(|error| self.failed(io::Error::other(error)))?;
+        let folder = self.0.parent().map_or(Ok(()), gyre_storage::create_folder);
+        let written = folder.and_then(|()| gyre_storage::write(&self.0, text));
+        written.map_err(|error| self.failed(error.source))
+    }
+
+    /// Returns the absolute path, so that the run may restart in any folder.
+    fn absolute(&self, to: &Path) -> Result<PathBuf, RecordingError> {
+        path::absolute(to).map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: io::Error) -> RecordingError {
+        RecordingError::io(&self.0, source)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Head, RecordingWriter};
 
     /// Writes a part without messages.
     fn write(path: &Path, number: usize) {

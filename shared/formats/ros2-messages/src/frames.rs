@@ -6,6 +6,7 @@
 
 use std::str::FromStr;
 
+use gyre_contract::{PoseHeader, flag, outcome};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose as planar, xy_yaw};
 use nalgebra::{Matrix3, Rotation2, Vector2};
 
@@ -14,6 +15,7 @@ use crate::{
     geometry_msgs::{self, Covariance, Point, Quaternion, Transform, TransformStamped, Vector3},
     nav_msgs::{MapMetaData, OccupancyGrid, Odometry},
     std_msgs::Header,
+    tf2_msgs::TFMessage,
 };
 
 /// Variance of the quantities that planar odometry does not measure: z, roll and pitch, and their
@@ -59,14 +61,113 @@ impl FromStr for Frames {
     }
 }
 
+/// The pose of the radar in the frame of the vehicle. Written as `X,Y,YAW`: m forward, m to the
+/// left, degrees counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Interval {
+pub struct Mounting(Pose);
+
+const NEEDED: &str =
+    "three numbers are needed: m forward, m to the left, degrees counter-clockwise, as in 1.2,0,90";
+
+impl FromStr for Mounting {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Result<Vec<f64>, _> = text.split(',').map(|it| it.trim().parse()).collect();
+        match numbers.as_deref() {
+            Ok(&[x_m, y_m, yaw_deg]) if [x_m, y_m, yaw_deg].iter().all(|it| it.is_finite()) => {
+                Ok(Self(planar(x_m, y_m, yaw_deg.to_radians())))
+            }
+            _ => Err(NEEDED.to_owned()),
+        }
+    }
+}
+
+impl Mounting {
+    pub fn radar(&self) -> &Pose {
+        &self.0
+    }
+
+    /// Returns the motion of the vehicle, in its own earlier frame, from the motion of the radar:
+    /// `B M B^-1` with the radar's pose `B`.
+    pub fn of_vehicle(&self, of_radar: &Pose) -> Pose {
+        self.0 * of_radar * self.0.inverse()
+    }
+
+    /// Returns the motion of the vehicle with its covariance: the displacement is turned by the
+    /// mounting, and an error in yaw moves the vehicle as far as the radar is from its origin.
+    pub fn of_vehicle_uncertain(&self, of_radar: &UncertainMotion) -> UncertainMotion {
+        let motion = self.of_vehicle(&of_radar.motion);
+        let at = self.0.translation.vector;
+        let moved = -(motion.rotation * Vector2::new(-at.y, at.x));
+        let mut jacobian: Matrix3<f64> = self.0.rotation.to_homogeneous();
+        (jacobian[(0, 2)], jacobian[(1, 2)]) = (moved.x, moved.y);
+        UncertainMotion {
+            motion,
+            covariance: jacobian * of_radar.covariance * jacobian.transpose(),
+        }
+    }
+}
+
+/// The vehicle that carries the radar: the messages of a run's poses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Vehicle {
+    pub frames: Frames,
+    pub mounting: Mounting,
+}
+
+impl Vehicle {
+    /// Returns the place of the radar on the vehicle.
+    pub fn mounted(&self, stamp_ns: i64) -> TFMessage {
+        let (base, radar) = (&self.frames.base, &self.frames.radar);
+        let mounted = transform(stamp_ns, base, radar, self.mounting.radar());
+        TFMessage {
+            transforms: vec![mounted],
+        }
+    }
+
+    /// Returns a pose of the radar as odometry of the vehicle.
+    pub fn odometry(&self, stamp_ns: i64, pose: &PoseHeader) -> Odometry {
+        let motion = pose.motion.motion().alone();
+        let since = Interval {
+            motion: self.mounting.of_vehicle_uncertain(&motion),
+            duration_ns: pose.motion.interval_ns,
+            is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
+        };
+        let since = (!pose.item.is(flag::BREAK)).then_some(&since);
+        let vehicle = self.mounting.of_vehicle_uncertain(&pose.pose());
+        odometry(stamp_ns, &self.frames, &vehicle, since)
+    }
+
+    /// Returns a pose of the radar as the transform of odometry, and with SLAM the correction by
+    /// loops as the transform of the map.
+    pub fn transforms(
+        &self,
+        stamp_ns: i64,
+        pose: &PoseHeader,
+        map_from_odometry: Option<&Pose>,
+    ) -> TFMessage {
+        let Frames {
+            map, odom, base, ..
+        } = &self.frames;
+        let vehicle = self.mounting.of_vehicle(&pose.pose().motion);
+        let mut transforms = vec![transform(stamp_ns, odom, base, &vehicle)];
+        transforms.extend(map_from_odometry.map(|correction| {
+            let correction = self.mounting.of_vehicle(correction);
+            transform(stamp_ns, map, odom, &correction)
+        }));
+        TFMessage { transforms }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
     /// the earlier frame.
-    pub motion: UncertainMotion,
-    pub duration_ns: i64,
+    motion: UncertainMotion,
+    duration_ns: i64,
     /// True if it was measured, not predicted from earlier motions.
-    pub is_measured: bool,
+    is_measured: bool,
 }
 
 /// Returns a pose in the odometry frame, and the velocity that led to it, as odometry.
@@ -76,7 +177,7 @@ pub(crate) struct Interval {
 /// covariance that follows from the motion's. The velocity of a predicted motion has the variance
 /// [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
 /// zero, with the same variance.
-pub(crate) fn odometry(
+fn odometry(
     stamp_ns: i64,
     frames: &Frames,
     pose: &UncertainMotion,
@@ -150,7 +251,7 @@ fn seconds(since: &Interval) -> f64 {
 }
 
 /// Returns the pose of the frame `inner` in the frame `outer`.
-pub(crate) fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
+fn transform(stamp_ns: i64, outer: &str, inner: &str, pose: &Pose) -> TransformStamped {
     let geometry_msgs::Pose {
         position: Point { x, y, z },
         orientation: rotation,
@@ -205,7 +306,7 @@ pub fn occupancy_grid(
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::FRAC_PI_2;
+    use std::f64::consts::{FRAC_PI_2, PI};
 
     use super::*;
 
@@ -279,28 +380,38 @@ mod tests {
         assert_eq!(first.twist.covariance, covariance(None));
     }
 
+    const OF_MOTION: Matrix3<f64> =
+        Matrix3::new(0.04, 0.01, 0.002, 0.01, 0.09, -0.001, 0.002, -0.001, 0.0004);
+
+    /// Returns the covariance of what is computed of a motion (x, y and yaw) with [`OF_MOTION`].
+    fn by_small_errors(
+        of: impl Fn([f64; 3]) -> nalgebra::Vector3<f64>,
+        motion: [f64; 3],
+    ) -> Matrix3<f64> {
+        let step = 1e-5;
+        let columns = [0, 1, 2].map(|value| {
+            let by = |amount: f64| {
+                let mut moved = motion;
+                moved[value] += amount;
+                of(moved)
+            };
+            (by(step) - by(-step)) / (2.0 * step)
+        });
+        let jacobian = Matrix3::from_columns(&columns);
+        jacobian * OF_MOTION * jacobian.transpose()
+    }
+
     #[test]
     fn the_covariance_of_a_velocity_is_that_of_small_errors_of_the_motion() {
-        let of_motion = Matrix3::new(0.04, 0.01, 0.002, 0.01, 0.09, -0.001, 0.002, -0.001, 0.0004);
         // Turns on both sides of the limit of the series.
         for yaw_rad in [0.0, 1e-7, 0.0199, -0.0201, 0.7, -FRAC_PI_2, 2.8] {
             let twist = |[x, y, yaw]: [f64; 3]| {
                 let twist = Twist::from_motion(&planar(x, y, yaw), 0.25);
                 nalgebra::Vector3::new(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps)
             };
-            let (motion, step) = ([3.0, -0.5, yaw_rad], 1e-5);
-            let columns = [0, 1, 2].map(|value| {
-                let by = |amount: f64| {
-                    let mut moved = motion;
-                    moved[value] += amount;
-                    twist(moved)
-                };
-                (by(step) - by(-step)) / (2.0 * step)
-            });
-            let jacobian = Matrix3::from_columns(&columns);
-            let expected = jacobian * of_motion * jacobian.transpose();
+            let expected = by_small_errors(twist, [3.0, -0.5, yaw_rad]);
             let found = velocity_covariance(&Interval {
-                motion: uncertain(planar(3.0, -0.5, yaw_rad), of_motion),
+                motion: uncertain(planar(3.0, -0.5, yaw_rad), OF_MOTION),
                 duration_ns: 250_000_000,
                 is_measured: true,
             });
@@ -309,5 +420,40 @@ mod tests {
                 "{yaw_rad}: {found} {expected}"
             );
         }
+    }
+
+    #[test]
+    fn a_mounting_is_three_numbers() {
+        let mounting: Mounting = "1.5, -0.2,180".parse().unwrap();
+        let [x_m, y_m, yaw_rad] = xy_yaw(mounting.radar());
+        assert_eq!((x_m, y_m), (1.5, -0.2));
+        assert!((yaw_rad.abs() - PI).abs() < 1e-12);
+        for text in ["", "1,2", "1,2,3,4", "ahead,0,0", "nan,0,0"] {
+            assert!(text.parse::<Mounting>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_radar_in_front_swings_out_where_the_vehicle_turns_on_the_spot() {
+        let mounting: Mounting = "2,0,90".parse().unwrap();
+        // The radar looks to the left: things ahead of the vehicle are to its right.
+        let of_radar = mounting.0.inverse() * planar(0.0, 0.0, FRAC_PI_2) * mounting.0;
+        let [x_m, y_m, yaw_rad] = xy_yaw(&mounting.of_vehicle(&of_radar));
+        assert!(x_m.abs() < 1e-12 && y_m.abs() < 1e-12);
+        assert!((yaw_rad - FRAC_PI_2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_covariance_is_that_of_small_errors_of_the_radars_motion() {
+        let mounting: Mounting = "1.2,-0.4,35".parse().unwrap();
+        let of_vehicle = |[x, y, yaw]: [f64; 3]| {
+            nalgebra::Vector3::from(xy_yaw(&mounting.of_vehicle(&planar(x, y, yaw))))
+        };
+        let expected = by_small_errors(of_vehicle, [3.0, 0.5, 0.8]);
+        let found = mounting.of_vehicle_uncertain(&uncertain(planar(3.0, 0.5, 0.8), OF_MOTION));
+        assert!(
+            (found.covariance - expected).norm() < 1e-6,
+            "{found:?} {expected}"
+        );
     }
 }

@@ -1,14 +1,12 @@
 //! The ROS 2 messages that Gyre speaks, without I/O.
 
 pub mod builtin_interfaces;
-mod cdr;
 mod definition;
 pub mod diagnostic_msgs;
 mod domain;
 pub mod frames;
 pub mod geometry_msgs;
 pub mod messages;
-mod mounting;
 pub mod nav_msgs;
 pub mod navtech_msgs;
 pub mod objects;
@@ -16,12 +14,9 @@ pub mod radar;
 pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod tf2_msgs;
-mod vehicle;
 pub mod vision_msgs;
 pub mod visualization_msgs;
 
-pub use cdr::{decode, encode};
-pub use definition::{Definition, Ros2Message};
+pub use definition::{Definition, Ros2Message, decode, encode};
 pub use domain::Domain;
-pub use mounting::Mounting;
-pub use vehicle::Vehicle;
+pub use frames::{Mounting, Vehicle};

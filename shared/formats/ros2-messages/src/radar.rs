@@ -4,7 +4,6 @@
 //! ([`SweepAssembler`](gyre_colossus::SweepAssembler)), and one clock gives them times
 //! ([`RadarClock`](gyre_colossus::RadarClock)).
 
-mod azimuths;
 mod b_scan;
 mod configuration;
 mod scan;

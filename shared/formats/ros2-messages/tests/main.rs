@@ -5,3 +5,4 @@
 mod cdr;
 mod objects;
 mod radar;
+mod turn;

@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use gyre_colossus::Configuration;
-use gyre_geometry::{OwnedScan, ScanLimits, scan::flag};
 use gyre_ros2_messages::{
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg},
@@ -11,42 +10,7 @@ use gyre_ros2_messages::{
     std_msgs::Header,
 };
 
-const START_NS: i64 = 1_549_986_608_000_000_007;
-
-/// A radar of 40 azimuths of 8 bins, which turns four times a second.
-fn radar() -> Configuration {
-    Configuration {
-        azimuth_samples: 40,
-        range_in_bins: 8,
-        encoder_size: 5600,
-        rotation_mhz: 4000,
-        range_resolution_m: Some(0.173_611),
-        range_gain: 1.0,
-        ..Configuration::default()
-    }
-}
-
-/// The scan of a turn, as a reader of recordings gives it.
-fn scan() -> OwnedScan {
-    let (azimuths, bins) = (40, 8);
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: azimuths * bins,
-        azimuths,
-    });
-    for row in 0..azimuths {
-        let encoder = (140 * row + 13) as f64;
-        scan.azimuth_rad[row] = (encoder * (TAU / 5600.0)) as f32;
-        scan.stamp_ns[row] = START_NS + 6_250_000 * row as i64;
-        scan.flags[row] = flag::MEASURED;
-        for bin in 0..bins {
-            scan.bytes[row * bins + bin] = (row * 7 + bin) as u8;
-        }
-    }
-    (scan.geometry.azimuths, scan.geometry.bins) = (azimuths, bins);
-    scan.geometry.stride = bins;
-    scan.geometry.stamp_ns = START_NS + 125_000_000;
-    scan
-}
+use crate::turn::{BINS, START_NS, radar, scan};
 
 #[test]
 fn numbers_of_the_older_form_have_their_bytes() {
@@ -56,7 +20,7 @@ fn numbers_of_the_older_form_have_their_bytes() {
 
 #[test]
 fn rows_that_the_driver_has_not_written_are_missing() {
-    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
+    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
     for row in [3, 39] {
         (message.encoder_values[row], message.timestamps[row]) = (0, 0);
     }
@@ -70,7 +34,7 @@ fn rows_that_the_driver_has_not_written_are_missing() {
 fn a_turn_of_which_the_driver_has_written_nothing_has_no_rows() {
     let messages = ScanMessages::new(radar(), "radar");
     let from_zero = || {
-        let mut message = messages.b_scan(scan().view());
+        let mut message = messages.b_scan(scan(0).view());
         let encoders = message.encoder_values.iter_mut();
         encoders.for_each(|encoder| *encoder -= 13);
         message
@@ -86,9 +50,9 @@ fn a_turn_of_which_the_driver_has_written_nothing_has_no_rows() {
 
 #[test]
 fn a_turned_image_is_turned_back() {
-    let plain = ScanMessages::new(radar(), "radar").b_scan(scan().view());
+    let plain = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
     let mut turned = plain.clone();
-    turned.b_scan_img.data.rotate_right(5 * 8);
+    turned.b_scan_img.data.rotate_right(5 * BINS);
     let powers = |message: &RadarBScanMsg, offset| -> Vec<Vec<u8>> {
         let rows = message.rows(&radar(), offset, START_NS).unwrap();
         rows.map(|row| row.azimuth.powers.bytes().to_vec())
@@ -100,7 +64,7 @@ fn a_turned_image_is_turned_back() {
 
 #[test]
 fn a_radar_without_a_clock_has_the_times_of_receipt() {
-    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
+    let mut message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
     message.timestamps.fill(0);
     let rows: Vec<_> = message.rows(&radar(), 0, START_NS).unwrap().collect();
     // The message is received when the turn has ended.
@@ -113,7 +77,7 @@ fn a_radar_without_a_clock_has_the_times_of_receipt() {
 #[test]
 fn an_image_alone_is_evenly_spaced() {
     let image = ScanMessages::new(radar(), "radar")
-        .b_scan(scan().view())
+        .b_scan(scan(0).view())
         .b_scan_img;
     let rows: Vec<_> = image.rows(&radar(), 0, START_NS).unwrap().collect();
     assert_eq!(rows.len(), 40);
@@ -126,7 +90,7 @@ fn images_that_are_not_of_powers_are_refused() {
     type Edit = fn(&mut RadarBScanMsg);
     let edits: [(Edit, &str); 4] = [
         (|it| it.b_scan_img.encoding = "rgb8".to_owned(), "pixels"),
-        (|it| it.b_scan_img.height = u32::MAX, "rows of 8 bytes"),
+        (|it| it.b_scan_img.height = u32::MAX, "rows of 64 bytes"),
         (|it| it.b_scan_img.width = 0, "for 0 bins"),
         (
             |it| it.timestamps.truncate(39),
@@ -134,7 +98,7 @@ fn images_that_are_not_of_powers_are_refused() {
         ),
     ];
     for (edit, expected) in edits {
-        let mut message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
+        let mut message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
         edit(&mut message);
         let refused = message.rows(&radar(), 0, 0).err().unwrap();
         assert!(refused.contains(expected), "{refused}");
@@ -222,7 +186,7 @@ fn depths_of_bins_are_in_tenths_of_millimetres_or_in_metres_and_others_are_refus
 
 #[test]
 fn times_of_rows_are_in_the_unit_in_which_the_radar_turns() {
-    let message = ScanMessages::new(radar(), "radar").b_scan(scan().view());
+    let message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
     let split = |message: &RadarBScanMsg| -> Vec<_> {
         let rows = message.rows(&radar(), 0, START_NS).unwrap();
         rows.map(|row| (row.azimuth.seconds, row.azimuth.split_seconds))

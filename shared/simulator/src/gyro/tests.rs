@@ -1,7 +1,10 @@
 use gyre_geometry::samples::Sample;
 use nalgebra::Vector3;
 
-use super::{attitude::MeanMotion, clock::Clock, errors::Errors, log, *};
+use super::{
+    log::{self, Clock, Errors, MeanMotion},
+    *,
+};
 use crate::{config::SimulationConfig, simulator::Simulator};
 
 const RATE_HZ: f64 = 100.0;
@@ -18,8 +21,7 @@ fn drive(profile: GyroProfile, faults: bool, scans: usize) -> (Simulator, Vec<Sa
         ..SimulationConfig::default()
     };
     let simulator = Simulator::new(&config).unwrap();
-    let (path, span) = (simulator.path(), simulator.span());
-    let samples = log::samples(&config.gyro, config.seed, path, span).unwrap();
+    let samples = log::samples(&simulator).unwrap();
     (simulator, samples)
 }
 

@@ -2,7 +2,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use gyre_geometry::Pose;
 
-use super::continuous::Path;
+use super::Path;
 
 /// Length of a bend by 90 degrees along the path, metres.
 const BEND_M: f64 = 20.0;

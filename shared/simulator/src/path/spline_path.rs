@@ -6,7 +6,7 @@ use gyre_geometry::Pose;
 use gyre_radar::median;
 use nalgebra::Vector2;
 
-use super::continuous::Path;
+use super::Path;
 use super::spline::{Sample, UniformSpline};
 
 /// Cut-off frequency for measured poses, Hz: faster changes are noise.

@@ -1,5 +1,3 @@
-use crate::interpolate::interpolate;
-
 /// Two-way side lobes: dB below the main lobe by the angle in half-power widths.
 /// The envelope measured on Oxford's, RADIATE's and Boreas-RT's scans: medians of the azimuths
 /// beside isolated strong echoes.
@@ -57,6 +55,20 @@ impl Antenna {
             .amplitudes
             .partition_point(|&gain| f64::from(gain) >= min_gain);
         beyond as f64 / self.scale
+    }
+}
+
+/// The value of a table at a place: linear between its entries, constant before the first and after
+/// the last.
+pub(super) fn interpolate(table: &[(f64, f64)], at: f64) -> f64 {
+    let next = table.partition_point(|entry| entry.0 <= at);
+    match (next, table.get(next)) {
+        (_, None) => table[table.len() - 1].1,
+        (0, Some(first)) => first.1,
+        (_, Some(after)) => {
+            let before = table[next - 1];
+            before.1 + (after.1 - before.1) * (at - before.0) / (after.0 - before.0)
+        }
     }
 }
 

@@ -2,7 +2,6 @@ use super::*;
 use crate::{
     asterix::{MAX_DATAGRAM_BYTES, write_azimuth, write_description},
     clock::{ByteOrder, ClockFormat},
-    message::{Azimuth, Powers},
 };
 
 const ENCODER: u16 = 5600;

@@ -4,6 +4,5 @@
 
 mod clocks;
 mod messages;
-mod parsing;
 mod support;
 mod sweeps;

@@ -8,8 +8,7 @@ use super::error::OpenError;
 use super::first_image::FirstImage;
 use super::format::Format;
 use super::image_list::has_png;
-use super::image_source::ImageSource;
-use super::images::Images;
+use super::images::{ImageSource, Images};
 use super::profiles::{KNOWN, Known, Profile};
 
 pub(crate) struct Found {

@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeSet,
+    fmt,
     ops::RangeInclusive,
     path::{Path, PathBuf},
 };
@@ -12,8 +13,6 @@ use super::{
     error::{OpenError, ReadError},
     format::Format,
     image_list::{self, file_number},
-    image_size::ImageSize,
-    image_source::ImageSource,
     png_image::{self, ImageReader},
     stamp,
 };
@@ -21,6 +20,45 @@ use super::{
 const FIRST_TRIES: usize = 8;
 /// Number of images, spread over all of them, whose sizes are looked at.
 const SIZES: usize = 32;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct ImageSize {
+    pub width: usize,
+    pub height: usize,
+}
+
+impl ImageSize {
+    /// Bytes of the image: one per pixel.
+    pub fn bytes(self) -> usize {
+        self.width * self.height
+    }
+}
+
+impl fmt::Display for ImageSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} columns x {} rows", self.width, self.height)
+    }
+}
+
+/// A generator of a recording's images on request. [`open_source`](super::open_source) reads them
+/// like images on disk.
+pub trait ImageSource: Send {
+    fn format(&self) -> Format;
+
+    fn size(&self) -> ImageSize;
+
+    /// The folder of images in the corresponding recording on disk, relative to its root.
+    fn folder(&self) -> PathBuf;
+
+    /// The image files in that folder, ordered by time.
+    fn files(&self) -> Vec<PathBuf>;
+
+    /// The text of the list of stamps beside that folder, in formats whose images have no stamps.
+    fn stamps(&self) -> Option<String>;
+
+    /// Writes the image of file `index` to `pixels`, row-major, of size [`ImageSource::size`].
+    fn draw(&mut self, index: usize, pixels: &mut [u8]);
+}
 
 /// Images in order, of one width.
 pub(crate) struct Images {

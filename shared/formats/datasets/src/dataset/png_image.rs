@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::error::ReadError;
-use super::image_size::ImageSize;
+use super::images::ImageSize;
 
 /// Maximum size of an image, bytes: 1024 azimuths of 32,768 range bins and their metadata.
 const MAX_IMAGE_BYTES: u64 = 1024 * (32_768 + 11);

@@ -19,9 +19,8 @@ use super::{
     images::Images,
     options::DatasetOptions,
     sensor_clock::SensorClock,
-    stale::StaleRows,
     stamp::{self, SECOND_NS},
-    transposed::{TransposedScans, Turn},
+    transposed::{StaleRows, TransposedScans, Turn},
 };
 
 /// The largest list of stamps: months of scans.
@@ -242,21 +241,6 @@ mod tests {
     fn received(frames: std::ops::Range<i64>, offset_ns: i64) -> Vec<Receipt> {
         let ns = |frame| 1_549_986_607_000_000_000 + frame * 250_000_000 + offset_ns;
         frames.map(|frame| (frame, ns(frame))).collect()
-    }
-
-    #[test]
-    fn a_single_time_that_is_a_year_off_is_left_out() {
-        for off_ns in [-31_536_000, -60, 60, 31_536_000].map(|s| s * SECOND_NS) {
-            let mut frames = received(0..20, 0);
-            frames[7].1 += off_ns;
-            let [segment] = &segments(&frames)[..] else {
-                panic!("{off_ns}");
-            };
-            assert_eq!(segment.len(), 19);
-        }
-        let mut stalled = received(0..20, 0);
-        stalled[7].1 += 1_400_000_000;
-        assert_eq!(segments(&stalled)[0].len(), 20);
     }
 
     #[test]

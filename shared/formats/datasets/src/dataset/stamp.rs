@@ -34,18 +34,14 @@ pub fn parse_seconds(text: &str) -> Option<i64> {
     let digits = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
     let unsigned = whole.strip_prefix('-').unwrap_or(whole);
     if unsigned.is_empty() || !digits(unsigned) || !digits(fraction) {
-        return rounded_ns(text.parse().ok()?);
+        let ns = text.parse::<f64>().ok()? * 1e9;
+        return (ns.abs() <= MAX_NS as f64).then_some(ns.round() as i64);
     }
     let sign = if whole.starts_with('-') { -1 } else { 1 };
     let seconds: i64 = unsigned.parse().ok()?;
     let nanoseconds = format!("{fraction:0<9}").get(..9)?.parse::<i64>().ok()?;
     let ns = seconds.checked_mul(SECOND_NS)?.checked_add(nanoseconds)?;
     (ns <= MAX_NS).then_some(sign * ns)
-}
-
-fn rounded_ns(seconds: f64) -> Option<i64> {
-    let ns = seconds * 1e9;
-    (ns.abs() <= MAX_NS as f64).then_some(ns.round() as i64)
 }
 
 /// Duration of a turn, ns: the median time between consecutive scans without those that span a gap,

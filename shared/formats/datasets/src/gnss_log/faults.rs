@@ -4,10 +4,7 @@ use gyre_geometry::samples::{LocalPlane, RawFix};
 use serde::Serialize;
 
 use super::LoggedFix;
-use crate::{
-    stretches::{between, longest_chain},
-    table::{Raw, leave_out},
-};
+use crate::table::{Raw, between, leave_out, longest_chain};
 
 /// No vehicle that carries a spinning radar is faster, m/s.
 const MAX_SPEED_MPS: f64 = 70.0;

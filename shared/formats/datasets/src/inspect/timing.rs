@@ -122,12 +122,13 @@ fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
             backwards.push(scan);
         }
     }
+    let bound = |of: fn(f64, f64) -> f64| logged_s.iter().copied().reduce(of).unwrap_or(0.0);
     Some(Timing {
         first_ns: *used.first()?,
         last_ns: *used.last()?,
         period_s,
         jitter_s: jitter_s(&logged_s, period_s),
-        logged_interval_s: extremes(&logged_s),
+        logged_interval_s: (bound(f64::max), bound(f64::min)),
         missing_scans: gaps.iter().map(|g| g.missing).sum(),
         gaps,
         stalls,
@@ -159,12 +160,6 @@ fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {
     let regular: Vec<f64> = regular.collect();
     let squares = regular.iter().map(|d| d * d).sum::<f64>();
     (squares / regular.len().max(1) as f64).sqrt()
-}
-
-fn extremes(values: &[f64]) -> (f64, f64) {
-    let max = values.iter().copied().reduce(f64::max);
-    let min = values.iter().copied().reduce(f64::min);
-    (max.unwrap_or(0.0), min.unwrap_or(0.0))
 }
 
 #[cfg(test)]

@@ -1,12 +1,8 @@
 //! Readers on small generated datasets, valid and invalid: images and their series, the rows of a
 //! sweep, formats and options.
 
-mod encoders;
 mod formats;
 mod images;
-mod lost_azimuths;
-mod packed;
-mod radiate;
 mod rows;
 mod series;
 

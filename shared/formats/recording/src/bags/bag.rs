@@ -7,15 +7,14 @@ use std::{
 
 use gyre_datasets::DatasetOptions;
 use gyre_ros2_messages::radar::DescribedRadar;
+use mcap::records::op;
 
 use crate::{
     bags::{
         Channel, McapFile, Message, RecordingError,
-        azimuths::described,
         files::{Files, compressed},
         radar::{ENCODER_COUNTS, Survey},
-        spans::{TimedSpan, spans},
-        topics::{Kind, Topics},
+        topics::{Kind, Topics, described},
     },
     file::{Span, Times, joined},
 };
@@ -37,6 +36,14 @@ struct Placed {
     until_ns: i64,
 }
 
+/// A chunk with messages, or records that are read together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct TimedSpan {
+    span: Span,
+    /// The receive times of its first and last message.
+    times_ns: Times,
+}
+
 /// The place of a message in the order of time, and then of the files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Key {
@@ -49,6 +56,8 @@ pub(crate) struct Key {
 
 /// Messages are sorted within a window of so many spans. Chunks have about 1 MB.
 const WINDOW: usize = 64;
+/// Records outside of chunks form a span of their own from this size on, bytes.
+const PLAIN_BYTES: u64 = 4 << 20;
 /// Files of one recorder overlap by no more than this, ns: messages are a little out of order where
 /// one file ends.
 const OVERLAP_NS: u64 = 1_000_000_000;
@@ -250,6 +259,40 @@ impl Bag {
             checked.map(|()| described).map_err(|e| e.to_string())
         })
     }
+}
+
+/// Finds the spans of a file with messages, and learns its channels from the summary at its end.
+fn spans(file: &mut McapFile) -> Result<Vec<TimedSpan>, RecordingError> {
+    let mut found = Vec::new();
+    // Records outside of chunks.
+    let mut plain: Option<TimedSpan> = None;
+    while let Some((opcode, span)) = file.next_record()? {
+        let times_ns = file.times_ns(opcode, span)?;
+        match opcode {
+            op::SCHEMA | op::CHANNEL if file.is_complete => {
+                file.read(span, |_| false)?;
+            }
+            op::SCHEMA | op::CHANNEL | op::MESSAGE => {
+                // A damaged place parts them.
+                let ends_there = |plain: &mut TimedSpan| plain.span.end() != span.offset;
+                found.extend(plain.take_if(ends_there));
+                let plain = plain.get_or_insert(TimedSpan {
+                    span: Span { bytes: 0, ..span },
+                    times_ns,
+                });
+                plain.span.bytes += span.bytes;
+                plain.times_ns = joined(plain.times_ns, times_ns);
+            }
+            _ => found.extend(plain.take()),
+        }
+        let is_long = |plain: &mut TimedSpan| plain.span.bytes >= PLAIN_BYTES;
+        found.extend(plain.take_if(is_long));
+        if opcode == op::CHUNK {
+            found.push(TimedSpan { span, times_ns });
+        }
+    }
+    found.extend(plain);
+    Ok(found)
 }
 
 /// Opens a file, finds its spans, and learns its channels: a file without a list of them, or with

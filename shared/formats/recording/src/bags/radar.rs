@@ -13,8 +13,7 @@ use gyre_ros2_messages::{
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::of,
-    topics::{Form, Kind},
+    topics::{Form, Kind, of},
 };
 
 pub(crate) const ENCODER_COUNTS: u16 = 5600;

@@ -22,11 +22,10 @@ use index::{Entry, Index};
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::azimuths,
     bag::{Bag, Key},
     files::{Files, files},
-    fixes, samples,
-    topics::Topics,
+    sensors,
+    topics::{Topics, azimuths},
 };
 
 pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
@@ -202,11 +201,11 @@ impl Dataset for Scans {
         of: SampleKind,
         topic: Option<&str>,
     ) -> Result<Option<Vec<Sample>>, OpenError> {
-        Ok(samples::read(&mut self.bag, &self.path, of, topic)?)
+        Ok(sensors::samples(&mut self.bag, &self.path, of, topic)?)
     }
 
     fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
-        Ok(fixes::read(&mut self.bag, &self.path, topic)?)
+        Ok(sensors::fixes_of(&mut self.bag, &self.path, topic)?)
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {

@@ -1,10 +1,18 @@
-//! The topics of a radar in a bag, recognised by their types.
+//! The topics of a radar in a bag, recognised by their types, and their messages as azimuths.
 
 use std::{collections::BTreeSet, path::Path};
 
+use gyre_colossus::Azimuth;
+use gyre_ros2_messages::{
+    Ros2Message, decode,
+    messages::{RadarConfigurationMessage, RadarFftDataMessage},
+    navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    radar::DescribedRadar,
+    sensor_msgs::Image,
+};
 use gyre_storage::quoted;
 
-use crate::bags::{Channel, RecordingError};
+use crate::bags::{Channel, Message, RecordingError};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
@@ -57,10 +65,6 @@ impl Topic {
 
     fn has_scans(&self) -> bool {
         !matches!(self.kind, Kind::Configuration(_))
-    }
-
-    fn is_b_scan_image(&self) -> bool {
-        self.kind == Kind::Images && self.name.ends_with("b_scan_image")
     }
 }
 
@@ -139,7 +143,9 @@ fn candidates<'a>(topics: &'a BTreeSet<Topic>, wished: Option<&str>) -> Vec<&'a 
     }
     let radar: Vec<_> = scans().filter(|topic| topic.kind != Kind::Images).collect();
     match radar.is_empty() {
-        true => scans().filter(|topic| topic.is_b_scan_image()).collect(),
+        true => scans()
+            .filter(|topic| topic.name.ends_with("b_scan_image"))
+            .collect(),
         false => radar,
     }
 }
@@ -159,6 +165,55 @@ fn names<'a>(names: impl Iterator<Item = &'a str>) -> String {
     }
     let listed: Vec<&str> = names.into_iter().collect();
     listed.join(", ") + if more { ", ..." } else { "" }
+}
+
+pub(crate) fn described(form: Form, message: &Message) -> Result<DescribedRadar, String> {
+    match form {
+        Form::Numbers => of::<RadarConfigurationMsg>(message)?.configuration(),
+        Form::Bytes => of::<RadarConfigurationMessage>(message)?.configuration(),
+    }
+}
+
+/// Calls `each` with the azimuths in a message of a scan topic and their receive times, ns.
+pub(crate) fn azimuths(
+    kind: Kind,
+    message: &Message,
+    described: &DescribedRadar,
+    mut each: impl FnMut(Azimuth<'_>, i64),
+) -> Result<(), String> {
+    let DescribedRadar {
+        radar,
+        azimuth_offset,
+    } = described;
+    match kind {
+        Kind::Azimuths(Form::Numbers) => {
+            let azimuth: RadarFftDataMsg = of(message)?;
+            each(azimuth.azimuth(), azimuth.header.stamp_or(message.log_ns));
+        }
+        Kind::Azimuths(Form::Bytes) => {
+            let azimuth: RadarFftDataMessage = of(message)?;
+            let received_ns = azimuth.header.stamp_or(message.log_ns);
+            each(azimuth.azimuth()?, received_ns);
+        }
+        Kind::BScans => {
+            // The stamp in its header is the radar's.
+            let scan: RadarBScanMsg = of(message)?;
+            let rows = scan.rows(radar, *azimuth_offset, message.log_ns)?;
+            rows.for_each(|row| each(row.azimuth, row.arrived_ns));
+        }
+        Kind::Images => {
+            let image: Image = of(message)?;
+            let received_ns = image.header.stamp_or(message.log_ns);
+            let rows = image.rows(radar, *azimuth_offset, received_ns)?;
+            rows.for_each(|row| each(row.azimuth, row.arrived_ns));
+        }
+        Kind::Configuration(_) => {}
+    }
+    Ok(())
+}
+
+pub(crate) fn of<T: Ros2Message>(message: &Message) -> Result<T, String> {
+    decode(&message.data)
 }
 
 #[cfg(test)]

@@ -1,10 +1,8 @@
 //! Writes a bag.
 
-mod metadata;
-
 use std::{
     collections::BTreeMap,
-    fmt::Display,
+    fmt::{Display, Write as _},
     fs::{self, File},
     io::{self, BufWriter},
     marker::PhantomData,
@@ -19,7 +17,6 @@ use crate::bags::{
     RecordingError,
     files::{METADATA, PROFILE},
 };
-use metadata::Described;
 
 /// The size of a chunk, uncompressed, bytes: a few scans.
 const CHUNK_BYTES: u64 = 4 << 20;
@@ -39,6 +36,15 @@ pub enum Kept {
 pub struct Topic<T> {
     index: usize,
     message: PhantomData<T>,
+}
+
+struct Described {
+    channel: u16,
+    name: String,
+    type_name: String,
+    /// The qualities of service, as YAML.
+    qualities: String,
+    messages: u64,
 }
 
 /// Writes a bag: a folder with a `metadata.yaml`, or one file if the name ends in `.mcap`. It has
@@ -105,7 +111,7 @@ impl BagWriter {
             channel: 0,
             name: name.to_owned(),
             type_name: definition.type_name(),
-            qualities: metadata::qualities(kept),
+            qualities: qualities(kept),
             messages: 0,
         };
         let channel = self.add_channel(&described, &definition.text());
@@ -162,7 +168,7 @@ impl BagWriter {
             .map_err(|error| unwritable(&path, error))?;
         let mut files = Vec::new();
         if let Some(file) = &self.file_name {
-            let text = metadata::text(file, &self.topics, self.times);
+            let text = description(file, &self.topics, self.times);
             let description = self.aside.join(METADATA);
             fs::write(&description, text).map_err(failed)?;
             files.extend([self.aside.join(file), description]);
@@ -223,4 +229,66 @@ fn remove(aside: &Path) {
 
 fn unwritable(path: &Path, reason: impl Display) -> RecordingError {
     RecordingError::Other(format!("cannot write {}: {reason}", path.display()))
+}
+
+/// Returns the qualities of service of a topic, as `rosbag2` writes them: the last message or a
+/// hundred kept, reliable, no deadlines.
+fn qualities(kept: Kept) -> String {
+    // The numbers are defined by rmw: history keep last, reliability reliable, durability transient
+    // local or volatile.
+    let (depth, durability) = match kept {
+        Kept::ForLater => (1, 1),
+        Kept::ForNobody => (100, 2),
+    };
+    let endless = "\n    sec: 9223372036\n    nsec: 854775807";
+    format!(
+        "- history: 1\n  depth: {depth}\n  reliability: 1\n  durability: {durability}\n  deadline:{endless}\n  lifespan:{endless}\n  \
+         liveliness: 1\n  liveliness_lease_duration:{endless}\n  avoid_ros_namespace_conventions: false"
+    )
+}
+
+/// Returns the `metadata.yaml` of a bag with one file, from the first to the last time in it, ns
+/// since 1970; in version 5 of ROS 2 Humble, which later versions read.
+fn description(file: &str, topics: &[Described], times: Option<(i64, i64)>) -> String {
+    let (first_ns, last_ns) = times.unwrap_or_default();
+    let duration_ns = last_ns - first_ns;
+    let messages: u64 = topics.iter().map(|topic| topic.messages).sum();
+    let file = quoted(file);
+    let mut text = format!(
+        "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {duration_ns}\n  \
+         starting_time:\n    nanoseconds_since_epoch: {first_ns}\n  message_count: {messages}\n  topics_with_message_count:\n"
+    );
+    for topic in topics {
+        let _ = write!(
+            text,
+            "    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n        \
+             offered_qos_profiles: {}\n      message_count: {}\n",
+            quoted(&topic.name),
+            quoted(&topic.type_name),
+            quoted(&topic.qualities),
+            topic.messages
+        );
+    }
+    let _ = write!(
+        text,
+        "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - {file}\n  files:\n    - path: {file}\n      \
+         starting_time:\n        nanoseconds_since_epoch: {first_ns}\n      duration:\n        nanoseconds: {duration_ns}\n      \
+         message_count: {messages}\n"
+    );
+    text
+}
+
+/// Returns a text between double quotes, as JSON and YAML have it.
+fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_quoted() {
+        assert_eq!(quoted("a \"b\" \\ \n\u{7}"), r#""a \"b\" \\ \n\u0007""#);
+    }
 }

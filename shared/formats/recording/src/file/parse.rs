@@ -1,11 +1,55 @@
-//! A record from its bytes.
+//! Records from their bytes.
 
 use std::borrow::Cow;
 
 use mcap::{
     McapError,
     records::{Record, op},
+    sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
+
+/// The largest record that is read, bytes: several times the largest scan, and the most that a
+/// recorder writes at once.
+const MAX_RECORD_BYTES: usize = 128 << 20;
+/// The most that is kept of a part of a file, bytes: few compressed bytes may stand for many.
+const MAX_KEPT_BYTES: usize = 256 << 20;
+
+/// Calls `keep` with all records in the bytes of a file, of chunks with those in them. It returns
+/// the bytes of memory that it uses for the record. Their checksums are compared.
+///
+/// Incomplete records at the end are ignored.
+pub(super) fn records(
+    mut bytes: &[u8],
+    mut keep: impl FnMut(Record<'_>) -> usize,
+) -> Result<(), McapError> {
+    if !chunks_hold_their_records(bytes) {
+        return Err(McapError::UnexpectedEoc);
+    }
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_validate_chunk_crcs(true)
+        .with_record_length_limit(MAX_RECORD_BYTES);
+    let (mut reader, mut kept) = (LinearReader::new_with_options(options), 0);
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(_) if bytes.is_empty() => break,
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = bytes.split_at(wanted.min(bytes.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                bytes = later;
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                kept += keep(parse(opcode, data)?);
+                if kept > MAX_KEPT_BYTES {
+                    return Err(McapError::ChunkTooLarge(kept as u64));
+                }
+            }
+        }
+    }
+    Ok(())
+}
 
 /// Parses a header, a schema, a channel, a message or metadata. All other records are
 /// [`Record::Unknown`].
@@ -56,7 +100,7 @@ pub(super) fn fields(opcode: u8) -> Option<&'static [Field]> {
 
 /// Returns whether the records in all chunks that are not compressed end with their chunk. The
 /// reader subtracts their lengths from the chunk's, and would overflow.
-pub(super) fn chunks_hold_their_records(mut bytes: &[u8]) -> bool {
+fn chunks_hold_their_records(mut bytes: &[u8]) -> bool {
     while let Some((opcode, body)) = next(&mut bytes) {
         if opcode == op::CHUNK && chunk_holds_its_records(body) == Some(false) {
             return false;
@@ -187,7 +231,7 @@ mod tests {
         longer[1] += 1;
         let bytes = [chunk(&inner), chunk(&longer)].concat();
         assert!(!chunks_hold_their_records(&bytes));
-        let read = super::super::records::records(&bytes, |_| 0);
+        let read = records(&bytes, |_| 0);
         assert!(matches!(read, Err(McapError::UnexpectedEoc)));
     }
 }

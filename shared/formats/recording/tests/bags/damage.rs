@@ -1,4 +1,4 @@
-//! Bags that lack required parts.
+//! Bags that lack required parts, and bags of several files without a description.
 
 use gyre_recording::file::{McapFile, Span};
 use mcap::records::op;
@@ -85,5 +85,91 @@ fn whatever_is_damaged_of_a_chunk_it_alone_is_left_out_and_named() {
             "{damage}"
         );
         assert_has_turns(dataset.as_mut(), 4);
+    }
+}
+
+/// Writes messages into files of these names, `share` messages each.
+fn parts(folder: &Path, names: &[&str], mut messages: Messages, share: usize) {
+    fs::create_dir_all(folder).unwrap();
+    for name in names {
+        let rest = messages.0.split_off(messages.0.len().min(share));
+        messages.write(&folder.join(name), uncompressed());
+        messages = Messages(rest);
+    }
+    assert!(messages.0.is_empty());
+}
+
+#[test]
+fn files_are_in_the_order_of_their_times_whatever_their_names_are() {
+    let numbered: Vec<String> = (0..12).map(|part| format!("part-{part}.mcap")).collect();
+    let numbered: Vec<&str> = numbered.iter().map(String::as_str).collect();
+    for names in [
+        &numbered[..],
+        &["z.mcap", "m_10.mcap", "m_2.mcap", "a.mcap"],
+    ] {
+        let folder = Folder::new();
+        let bag = folder.path("drive");
+        let messages = azimuths(12, |_, _, message| Some(message));
+        let share = messages.0.len().div_ceil(names.len());
+        parts(&bag, names, messages, share);
+        let mut dataset = opened(&bag);
+        assert_eq!(dataset.files().len(), names.len());
+        assert_has_turns(dataset.as_mut(), 12);
+        assert_eq!(dataset.file(0), bag.join(names[0]));
+    }
+}
+
+#[test]
+fn files_without_chunks_are_in_the_order_of_their_times() {
+    let folder = Folder::new();
+    let mut messages = b_scans(6);
+    let later = Messages(messages.0.split_off(4));
+    messages.write(&folder.path("b.mcap"), uncompressed().use_chunks(false));
+    later.write(&folder.path("a.mcap"), uncompressed().use_chunks(false));
+    assert_has_turns(opened(folder.0.path()).as_mut(), 6);
+}
+
+#[test]
+fn files_of_the_same_time_are_refused() {
+    let folder = Folder::new();
+    b_scans(9).write(&folder.path("one.mcap"), uncompressed());
+    b_scans(8).write(&folder.path("other.mcap"), uncompressed());
+    let sentence = refused(folder.0.path());
+    for words in [
+        "files of the same time",
+        "one.mcap",
+        "other.mcap",
+        "name one file",
+    ] {
+        assert!(sentence.contains(words), "{sentence}");
+    }
+    assert_has_turns(opened(&folder.path("other.mcap")).as_mut(), 8);
+}
+
+#[test]
+fn messages_are_read_in_the_order_of_their_times_and_turns_once() {
+    let exchange = |messages: &mut Messages| {
+        let pairs = messages.0.chunks_exact_mut(2).step_by(5);
+        pairs.for_each(|pair| pair.swap(0, 1));
+    };
+    let reverse = |messages: &mut Messages| messages.0[1..].reverse();
+    let repeat = |messages: &mut Messages| {
+        let all = std::mem::take(&mut messages.0).into_iter();
+        messages.0 = all.flat_map(|message| [message.clone(), message]).collect();
+    };
+    let edits: [&dyn Fn(&mut Messages); 3] = [&exchange, &reverse, &repeat];
+    for (number, edit) in edits.iter().enumerate() {
+        for mut messages in [b_scans(12), azimuths(12, |_, _, message| Some(message))] {
+            edit(&mut messages);
+            for options in [uncompressed().chunk_size(Some(4000)), uncompressed()] {
+                let folder = Folder::new();
+                let path = folder.path("bag.mcap");
+                messages.write(&path, options);
+                let mut dataset = opened(&path);
+                assert_has_turns(dataset.as_mut(), 12);
+                let notes = dataset.notes().join(" ");
+                assert_eq!(notes.contains("left out"), number == 2, "{notes}");
+            }
+        }
     }
 }

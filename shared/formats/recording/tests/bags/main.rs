@@ -3,20 +3,19 @@
 
 mod damage;
 mod drivers;
-mod encoders;
-mod fixes;
-mod order;
+mod messages;
 mod samples;
+#[path = "../../../ros2-messages/tests/turn.rs"]
+mod turn;
 
 use std::{
-    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
 
 use gyre_colossus::Configuration;
-use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError, middle_ns};
-use gyre_geometry::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError};
+use gyre_geometry::OwnedScan;
 use gyre_recording::bags::{BagWriter, Kept, is_bag, open};
 use gyre_ros2_messages::{
     Ros2Message, decode, encode,
@@ -26,86 +25,8 @@ use gyre_ros2_messages::{
     radar::ScanMessages,
 };
 use mcap::{Compression, WriteOptions};
-
-const START_NS: i64 = 1_549_986_608_000_000_007;
-const TURN_NS: i64 = 250_000_000;
-const AZIMUTHS: usize = 40;
-const BINS: usize = 64;
-
-fn radar() -> Configuration {
-    Configuration {
-        azimuth_samples: AZIMUTHS as u16,
-        range_in_bins: BINS as u16,
-        encoder_size: 5600,
-        rotation_mhz: 4000,
-        range_resolution_m: Some(0.0438),
-        range_gain: 1.0,
-        ..Configuration::default()
-    }
-}
-
-/// The scan of a turn.
-fn scan(turn: usize) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: AZIMUTHS * BINS,
-        azimuths: AZIMUTHS,
-    });
-    for row in 0..AZIMUTHS {
-        let encoder = (140 * row + 13) as f64;
-        scan.azimuth_rad[row] = (encoder * (std::f64::consts::TAU / 5600.0)) as f32;
-        scan.stamp_ns[row] = START_NS + TURN_NS * turn as i64 + 6_250_000 * row as i64;
-        scan.flags[row] = flag::MEASURED;
-        for bin in 0..BINS {
-            scan.bytes[row * BINS + bin] = (turn * 31 + row * 7 + bin * bin) as u8;
-        }
-    }
-    scan.geometry = SweepGeometry {
-        azimuths: AZIMUTHS,
-        bins: BINS,
-        stride: BINS,
-        range_resolution_m: 0.0438,
-        stamp_ns: middle_ns(scan.stamp_ns[0], scan.stamp_ns[AZIMUTHS - 1]),
-        ..scan.geometry
-    };
-    scan
-}
-
-/// The content of a bag: topic, schema, time and bytes of each message.
-#[derive(Default)]
-struct Messages(Vec<(String, String, String, i64, Vec<u8>)>);
-
-impl Messages {
-    fn add<T: Ros2Message>(&mut self, topic: &str, log_ns: i64, message: &T) {
-        let (name, text) = (T::DEFINITION.type_name(), T::DEFINITION.text());
-        self.add_bytes(topic, (&name, &text), log_ns, encode(message).unwrap());
-    }
-
-    fn add_bytes(&mut self, topic: &str, (name, text): (&str, &str), log_ns: i64, bytes: Vec<u8>) {
-        let texts = [topic, name, text].map(str::to_owned);
-        let [topic, name, text] = texts;
-        self.0.push((topic, name, text, log_ns, bytes));
-    }
-
-    /// Writes an MCAP file as recorders other than Gyre do.
-    fn write(&self, path: &Path, options: WriteOptions) {
-        let file = fs::File::create(path).unwrap();
-        let mut mcap = options.profile("ros2").create(file).unwrap();
-        for (sequence, (topic, name, text, log_ns, data)) in self.0.iter().enumerate() {
-            let schema = mcap.add_schema(name, "ros2msg", text.as_bytes()).unwrap();
-            let channel = mcap
-                .add_channel(schema, topic, "cdr", &BTreeMap::new())
-                .unwrap();
-            let header = mcap::records::MessageHeader {
-                channel_id: channel,
-                sequence: sequence as u32,
-                log_time: *log_ns as u64,
-                publish_time: *log_ns as u64,
-            };
-            mcap.write_to_known_channel(&header, data).unwrap();
-        }
-        mcap.finish().unwrap();
-    }
-}
+use messages::Messages;
+use turn::{AZIMUTHS, BINS, START_NS, TURN_NS, radar, scan};
 
 const B_SCANS: &str = "/radar_data/b_scan_msg";
 const AZIMUTH_DATA: &str = "/radar_data/fft_data";

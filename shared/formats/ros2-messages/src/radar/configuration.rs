@@ -1,13 +1,15 @@
-//! The radar's description of itself.
+//! Messages of the radar's description of itself, and of one azimuth.
 
 use std::ops::RangeInclusive;
 
-use gyre_colossus::Configuration;
+use gyre_colossus::{Azimuth, Configuration, Powers};
 
-use super::azimuths::number;
 use crate::{
-    Ros2Message, cdr::bad, messages::RadarConfigurationMessage,
-    navtech_msgs::RadarConfigurationMsg, std_msgs::Header,
+    Ros2Message,
+    definition::bad,
+    messages::{RadarConfigurationMessage, RadarFftDataMessage},
+    navtech_msgs::{RadarConfigurationMsg, RadarFftDataMsg},
+    std_msgs::Header,
 };
 
 /// Bins per metre of `bin_size`.
@@ -78,6 +80,39 @@ impl RadarConfigurationMessage {
             azimuth_offset: 0,
         })
     }
+}
+
+impl RadarFftDataMsg {
+    /// Returns the azimuth as the radar sent it. The angle comes from the encoder, because
+    /// [`RadarFftDataMsg::angle`] is wrong.
+    pub fn azimuth(&self) -> Azimuth<'_> {
+        Azimuth {
+            sweep_counter: self.sweep_counter,
+            encoder: self.azimuth,
+            seconds: self.ntp_seconds.to_le_bytes(),
+            split_seconds: self.ntp_split_seconds.to_le_bytes(),
+            powers: Powers::Eight(&self.data),
+        }
+    }
+}
+
+impl RadarFftDataMessage {
+    pub fn azimuth(&self) -> Result<Azimuth<'_>, String> {
+        let sweep_counter = number::<Self, 2>("sweep_counter", &self.sweep_counter)?;
+        Ok(Azimuth {
+            sweep_counter: u16::from_be_bytes(sweep_counter),
+            encoder: u16::from_be_bytes(number::<Self, 2>("azimuth", &self.azimuth)?),
+            seconds: number::<Self, 4>("ntp_seconds", &self.ntp_seconds)?,
+            split_seconds: number::<Self, 4>("ntp_split_seconds", &self.ntp_split_seconds)?,
+            powers: Powers::Eight(&self.data),
+        })
+    }
+}
+
+/// Returns the bytes of a number that is an array of its bytes.
+fn number<T: Ros2Message, const N: usize>(field: &str, bytes: &[u8]) -> Result<[u8; N], String> {
+    let reason = || format!("`{field}` has {} bytes, expected {N}", bytes.len());
+    bytes.try_into().map_err(|_| bad::<T>(reason()))
 }
 
 /// Returns the depth of a bin, m, of a `bin_size` in 1e-4 m, or of the oldest drivers in m.

@@ -13,9 +13,8 @@ use gyre_ros2_messages::radar::DescribedRadar;
 
 use crate::bags::{
     Message, RecordingError,
-    azimuths::azimuths,
     bag::{Bag, Key},
-    topics::{Kind, Topics},
+    topics::{Kind, Topics, azimuths},
 };
 
 /// Turns among which one of the same time is looked for.

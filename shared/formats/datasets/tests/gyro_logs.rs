@@ -1,11 +1,24 @@
-//! Formats.
+//! Logs of every format, as written here after the public development kits, their faults, and the
+//! real ones.
 
-use gyre_datasets::{Format, SampleLog};
+mod faults;
+mod wheels;
+
+use gyre_datasets::{Format, LogError, SampleLog};
 use gyre_geometry::samples::{SampleKind, UpAxis};
 use tempfile::TempDir;
 
-use super::{START_NS, read};
 use crate::common::{assert_refused, written};
+
+/// 2025-10-14, ns.
+const START_NS: i64 = 1_760_456_485_551_626_000;
+
+/// Reads a text as a file of this name.
+fn read(name: &str, text: &str) -> Result<SampleLog, LogError> {
+    let folder = TempDir::new().unwrap();
+    let path = written(&folder, name, text);
+    SampleLog::read_gyro(&path)
+}
 
 /// The rates and accelerations of the only sample.
 fn values(log: &SampleLog) -> [f64; 6] {
