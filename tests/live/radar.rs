@@ -15,7 +15,7 @@ use rustix::process::Signal;
 use tempfile::TempDir;
 
 use crate::{
-    common::{Ended, Run, gyre, odometry, recording},
+    common::{Ended, Run, gyre, odometry, recording, watch::Watch},
     operate::commands::ask,
 };
 
@@ -129,6 +129,19 @@ fn a_radar_gives_the_motions_of_its_recording() {
         assert_eq!(source["missing_azimuths"], 0);
         assert!(live == recorded, "{clock:?}:\n{live}\n{recorded}");
     }
+}
+
+#[test]
+fn what_a_radar_delivers_is_a_topic() {
+    let whole = whole(recording::SCANS);
+    let radar = Radar::playing(whole.path(), &[]);
+    let run = radar.run(recording::SCANS);
+    let running = run.started(2);
+    let watched = Watch::start(&run, "intake").await_message();
+    running.complete();
+    let watched = watched.finish();
+    assert!(watched.seqs.is_sorted() && watched.gaps == 0, "{watched:?}");
+    assert_eq!(watched.seqs.last(), Some(&(recording::SCANS as u64 - 1)));
 }
 
 /// A group that only this test of this process sends to.

@@ -7,6 +7,7 @@
 mod basis;
 pub mod control;
 mod follower;
+mod intake;
 mod item;
 pub mod layout;
 mod limits;
@@ -27,6 +28,7 @@ pub use basis::{Basis, WitnessCounts};
 pub use follower::{
     CorrectionHeader, FixHeader, ListedObject, LoopHeader, MAX_LISTED, ObjectsHeader, fix_status,
 };
+pub use intake::IntakeHeader;
 pub use item::{FollowerId, Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window};
 pub use masked::{MaskedHeader, MaskedParts, Pair, mask_kind};
@@ -38,6 +40,6 @@ pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::ScanHeader;
 pub use stages::{StageTopics, composed};
 pub use topics::{
-    Correction, Fix, Footprint, GivenAnew, Loop, Masked, Motion, NumberedBy, Objects, Pose,
+    Correction, Fix, Footprint, GivenAnew, Intake, Loop, Masked, Motion, NumberedBy, Objects, Pose,
     Refined, Rotation, Scan, all, named as topic_named, topic, topics,
 };

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::{
     follower::{CorrectionHeader, FixHeader, LoopHeader, ObjectsHeader},
+    intake::IntakeHeader,
     item::{FollowerId, StageId},
     limits::{History, Limits, TopicSizes, Window},
     masked::MaskedHeader,
@@ -81,6 +82,11 @@ topics! {
                 _ => TopicSizes { history: depth, buffer: depth, borrowed, ..sizes },
             }
         }
+    }
+    /// What a live radar has delivered, and what was lost, with each of its scans.
+    Intake = "intake" {
+        IntakeHeader, FloatBlock, by Sender::Stage(&[StageId::RadarReplay]), for [], Latest,
+        is [Recorded Linked Replaces]
     }
     /// Masked rasters and sparse points, and what gyro, wheels and Doppler have measured. Payload:
     /// one raster if the mask takes one scan, or two (this scan and the previous one, both masked
@@ -232,7 +238,7 @@ crate::named! {
 impl NumberedBy {
     pub fn of(name: &str) -> Self {
         match topic(name).map(|topic| topic.sender) {
-            _ if name == Scan::TOPIC => Self::Source,
+            Some(Sender::Stage([StageId::RadarReplay])) => Self::Source,
             Some(Sender::Stage(_)) => Self::Masking,
             _ => Self::Follower,
         }
@@ -276,13 +282,13 @@ mod tests {
         let (mut slam, mut with_objects) = (WINDOW, WINDOW);
         (slam.slam, with_objects.objects) = (true, true);
         assert_eq!(names(&WINDOW).last(), Some(&"pose"));
-        assert_eq!(names(&slam)[6..], ["loop", "correction"]);
+        assert_eq!(names(&slam)[7..], ["loop", "correction"]);
         let with_map = Window {
             localises: true,
             ..slam
         };
-        assert_eq!(names(&with_map)[6..], ["loop", "correction", "fix"]);
-        assert_eq!(names(&with_objects)[6..], ["objects"]);
+        assert_eq!(names(&with_map)[7..], ["loop", "correction", "fix"]);
+        assert_eq!(names(&with_objects)[7..], ["objects"]);
         assert_eq!(Masked::sizes(&with_objects), Masked::sizes(&slam));
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();
         assert_eq!(added, 3);

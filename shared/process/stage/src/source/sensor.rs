@@ -3,10 +3,16 @@
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
-use gyre_contract::{NumberedBy, Scan, ScanHeader, StageId, control::Received, run::StageCounters};
+use gyre_contract::{
+    Intake, IntakeHeader, NumberedBy, Scan, ScanHeader, StageId, control::Received,
+    run::StageCounters,
+};
 use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_transport::{
-    Generation, RunError, clock, numbers::Numbers, received, wake, writer::Draft,
+    Generation, RunError, clock,
+    numbers::Numbers,
+    received, wake,
+    writer::{Draft, Writer},
 };
 
 use super::{Feed, hop, live_samples::LiveSensors, position::Position};
@@ -70,6 +76,7 @@ pub fn run_sensor(
     let mut stream = Stream {
         received: received::open(&launch.manifest)?,
         live: LiveSensors::open(launch)?,
+        intake: Writer::open(&launch.node, &launch.manifest)?,
         feed: Feed::of_scans(launch)?.never_late(),
     };
     let ended = stream.publish(sensor, scans);
@@ -81,6 +88,7 @@ pub fn run_sensor(
 
 struct Stream<'a> {
     feed: Feed<'a, Scan>,
+    intake: Writer<Intake>,
     received: Numbers<9>,
     live: Option<LiveSensors>,
 }
@@ -104,8 +112,11 @@ impl Stream<'_> {
             // In this order a death in between leaves a number without a scan, which counts as
             // dropped, and no scan without a number.
             self.feed.schedule.has_published(position.published)?;
-            self.received.write(sensor.received().to_numbers())?;
+            let (item, received) = (*item, sensor.received());
+            self.received.write(received.to_numbers())?;
             self.feed.scans().send(draft, S::HOP)?;
+            self.intake
+                .publish(IntakeHeader::of(item, &received), Some(S::HOP))?;
             position.advance();
             // However fast scans come, there is time for signals and for new readers.
             self.feed
@@ -113,6 +124,7 @@ impl Stream<'_> {
         }
         let mut end = position.item();
         generation.mark(&mut end);
+        self.intake.end(end, Some(S::HOP))?;
         self.feed.end(end)?;
         loop {
             self.feed.sleep(wake::MAX_WAIT)?;
