@@ -114,9 +114,7 @@ fn a_dataset_becomes_a_bag_of_its_scans() {
     let run = Run::small().data(whole.path());
     let path = bag(&run, "scans.mcap");
     let exported = export(whole.path(), &path, &["--scans", "b-scan,fft"]);
-    exported.succeeded();
-
-    exported.prints("/radar_data/fft_data 9600");
+    exported.succeeded().prints("/radar_data/fft_data 9600");
     let words = [
         "scans on several topics",
         "--set dataset.topic=/radar_data/",

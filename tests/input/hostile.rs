@@ -55,7 +55,6 @@ fn files_without_end_are_refused_whatever_reads_them() {
     symlink("/dev/zero", &settings).unwrap();
     let simulated = tempfile::tempdir().unwrap();
     symlink("/dev/zero", simulated.path().join("simulation.toml")).unwrap();
-
     let models = Path::new(crate::PROJECT).join("shared/method/masking/tests/models");
     let card = file("single-127.toml");
     fs::copy(models.join("single-127.toml"), &card).unwrap();

@@ -8,7 +8,7 @@ use gyre_journal as journal;
 use gyre_recording::{open_recording, parts};
 use rustix::process::Signal;
 
-use super::record::{ALL, WINDOW, file, recorded};
+use super::record::{ALL, WINDOW, file, recorded, replay};
 use crate::common::{Run, recording, send};
 
 const SCANS: usize = 70;
@@ -47,6 +47,36 @@ fn a_recording_has_all_results_of_a_run_that_was_stopped() {
             let lacks = poses.keys().filter(|seq| !recorded.contains(seq));
             assert_eq!(lacks.count(), 0, "{topic}");
         }
+    }
+}
+
+#[test]
+#[ignore = ".ci/nightly: kills masking and the recorder of a live run"]
+fn a_recording_replays_to_the_results_after_masking_was_killed_with_the_recorder() {
+    let run = played();
+    let mut running = run.started(12);
+    let recorder = running.await_child("record", None);
+    send(recorder, Signal::KILL);
+    running.kill("masking");
+    running.finish().succeeded();
+    assert_eq!(parts(&file(&run)).len(), 2);
+    let recording = open_recording(&file(&run)).unwrap();
+    let generations: Vec<u32> = recording.entries("pose").map(|it| it.generation).collect();
+    assert!(generations.is_sorted() && generations.last() > generations.first());
+    let (scans, missed) = (scans_of_poses(&run), recording.missed());
+    for topic in ["masked", "rotation", "motion", "refined"] {
+        let entries: Vec<_> = recording.entries(topic).collect();
+        for entry in &entries {
+            let scan = scans.get(&entry.seq);
+            assert_eq!(scan, Some(&entry.scan), "{topic} {entry:?}");
+        }
+        let lacks = (scans.len() - entries.len()) as u64;
+        assert!(lacks <= missed.get(topic).copied().unwrap_or_default());
+        if lacks == 0 {
+            let again = replay(&file(&run), &["--from", topic]);
+            assert_eq!(again, run.odometry(), "from {topic}");
+        }
+        assert!(lacks == 0 || topic != "masked", "{lacks}");
     }
 }
 

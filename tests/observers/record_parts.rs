@@ -6,7 +6,7 @@ use std::{fs, path::PathBuf, slice};
 use gyre_recording::{Recording, parts};
 
 use super::record::{ALL, file, played, recorded, seqs};
-use crate::common::{gyre, recording::SCANS, undisturbed};
+use crate::common::{Run, gyre, recording::SCANS, undisturbed};
 
 /// Reads each part alone; returns the numbers of the messages of a topic, part by part.
 fn seqs_in(parts: &[PathBuf], topic: &str) -> Vec<u64> {
@@ -58,4 +58,25 @@ fn a_recorder_from_outside_goes_on_in_the_next_file_too() {
         let all: Vec<u64> = (seqs[0]..SCANS as u64).collect();
         assert_eq!(seqs, all, "{topic}");
     }
+}
+
+#[test]
+fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
+    let run = played().rate("1").set("run.window=1");
+    let running = run.started(SCANS / 3);
+    let mut record = gyre();
+    record
+        .arg("record")
+        .arg(run.out())
+        .arg("--to")
+        .arg(file(&run));
+    record.args(["--topics", "scan,masked"]);
+    let mut recorder = record.spawn().unwrap();
+    running.finish().succeeded();
+    recorder.wait().unwrap();
+    let scans = seqs_in(&parts(&file(&run)), "scan");
+    assert!(!scans.is_empty() && scans[0] > 0, "{scans:?}");
+    let replay = Run::small().data(&file(&run)).argument("--from", "masked");
+    let lacks = "lacks message 0 of topic `masked`";
+    replay.finish().refused_with(&[lacks]);
 }

@@ -365,10 +365,9 @@ fn an_interrupted_batch_keeps_what_it_has_and_goes_on() {
 }
 
 #[test]
-fn a_batch_or_a_task_that_cannot_be_is_refused_in_a_sentence() {
+fn a_batch_that_cannot_be_is_refused_in_a_sentence() {
     let drives = Drives::new().recordings(&[2]);
     let batch = |options: &[&str]| drives.batch("out").with(options).finish();
-
     fs::create_dir_all(drives.path("out/rows").parent().unwrap()).unwrap();
     batch(&["--collect"]).refused_with(&["is not the folder of a batch"]);
     fs::remove_file(drives.path("list.csv")).unwrap();

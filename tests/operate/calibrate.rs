@@ -70,6 +70,33 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     assert!((used_m - found_m).abs() < 1e-6, "{used_m}, {found_m}");
 }
 
+/// The offset and its standard deviation in the line of a drive or of all together.
+fn offset_of(block: &str) -> [f64; 2] {
+    let line = block.lines().find(|line| line.starts_with("range offset"));
+    let words = line.unwrap().split_whitespace();
+    let figures: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+    [figures[0], figures[1]]
+}
+
+#[test]
+#[ignore = ".ci/nightly: calibrates two drives"]
+fn two_drives_determine_a_radar_better_than_one() {
+    let recording = recording::around_a_block();
+    let out = tempfile::tempdir().unwrap();
+    let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());
+    let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
+    let with = ["--with", recording.to_str().unwrap()];
+    let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR], &with);
+    let said = ended.succeeded().stdout.clone();
+    let (each, together) = said.split_once("all together: ").unwrap();
+    let [alone, both] = [each, together].map(offset_of);
+    assert!((both[0] - alone[0]).abs() < 1e-3, "{said}");
+    assert!((both[1] - alone[1] / 2f64.sqrt()).abs() < 1e-3, "{said}");
+    assert!(out.path().join("calibration-2.svg").exists());
+    let file = fs::read_to_string(out.path().join("calibration.toml")).unwrap();
+    assert!((range_offset_m(&file) - both[0]).abs() < 1e-3, "{file}");
+}
+
 #[test]
 fn drives_that_are_read_with_different_constants_are_refused() {
     let (recording, out) = (recording::small(), tempfile::tempdir().unwrap());

@@ -7,9 +7,9 @@ use gyre_slam::localisation::Map;
 
 use crate::common::{Ended, Run, finished};
 
-fn drive(seed: u64) -> Run {
+fn drive(streets: u64, seed: u64) -> Run {
     let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
-        .set("simulation.seed=3")
+        .set(&format!("simulation.seed={streets}"))
         .set(&format!("simulation.sensor.seed={seed}"))
         .set("simulation.sensor.profile=cts350x-radiate")
         .set("slam.kind=graph");
@@ -18,7 +18,7 @@ fn drive(seed: u64) -> Run {
 
 /// Two thirds of the block.
 fn first() -> (Run, PathBuf) {
-    let run = drive(1);
+    let run = drive(3, 1);
     run.complete();
     let map = run.folder().join("map");
     draw(&run, &map, &[]).succeeded();
@@ -38,7 +38,9 @@ fn extend(run: &Run, map: &Path, out: &Path) -> Ended {
 fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     let (first, map) = first();
     // From half way round on, to the end of the block.
-    let second = drive(9).set("simulation.scans=64").set("source.first=20");
+    let second = drive(3, 9)
+        .set("simulation.scans=64")
+        .set("source.first=20");
     second.complete();
     let out = second.folder().join("map");
     extend(&second, &map, &out)
@@ -80,4 +82,16 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     let of_three = Map::open(&again).unwrap();
     let count = all.keyframes().len() + added.len();
     assert_eq!(of_three.keyframes().len(), count);
+}
+
+#[test]
+#[ignore = ".ci/nightly: a drive in another town"]
+fn a_drive_through_another_town_is_refused_and_the_map_is_kept() {
+    let (_first, map) = first();
+    let elsewhere = drive(5, 9);
+    elsewhere.complete();
+    let out = elsewhere.folder().join("map");
+    extend(&elsewhere, &map, &out).refused_with(&["no keyframe of", "was found in the map"]);
+    assert!(!out.exists());
+    Map::open(&map).unwrap();
 }

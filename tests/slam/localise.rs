@@ -55,8 +55,7 @@ fn map_of(run: &Run) -> PathBuf {
     run.folder().join("map")
 }
 
-fn localising(map: &Path, out: &Path) -> Command {
-    let drive = drive(Day::Third);
+fn localising(map: &Path, drive: &Path, out: &Path) -> Command {
     let configuration = out.with_extension("toml");
     fs::write(&configuration, CONFIGURATION).unwrap();
     let mut command = gyre();
@@ -83,7 +82,7 @@ fn rows(out: &Path) -> Vec<(i64, String, Option<Pose>)> {
 fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("found");
-    let ended = Ended::of(localising(&map_of(&run), &out));
+    let ended = Ended::of(localising(&map_of(&run), &drive(Day::Third), &out));
     let said = &ended.succeeded().stdout;
     assert!(said.starts_with("first fix: scan 0"), "{said}");
     let truth = read_trajectory(&first_drive().join("ground_truth.tum")).unwrap();
@@ -110,7 +109,7 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
     let picture = fs::read(out.join("fixes.png")).unwrap();
     assert!(picture.starts_with(b"\x89PNG"));
     let again = folder.path().join("again");
-    let mut command = localising(&map_of(&run), &again);
+    let mut command = localising(&map_of(&run), &drive(Day::Third), &again);
     command.arg("--json");
     let ended = Ended::of(command);
     let figures: Value = serde_json::from_str(&ended.succeeded().stdout).unwrap();
@@ -126,6 +125,26 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
         let mode = fs::metadata(&file).unwrap().mode();
         assert_eq!(mode & 0o777, 0o600, "{}: {mode:o}", file.display());
     }
+}
+
+#[test]
+#[ignore = ".ci/nightly: a drive in another town"]
+fn a_drive_through_another_town_is_lost_and_gets_no_fix() {
+    let (run, folder) = (mapped(), folder());
+    let out = folder.path().join("lost");
+    let settings = format!("{}seed = 4\n", recording::SENSOR);
+    let elsewhere = recording::configured("other-town", &settings);
+    let ended = Ended::of(localising(&map_of(&run), &elsewhere, &out));
+    // The answer is no before all scans were looked for.
+    let map = map_of(&run);
+    let words = ["no scan of ", map.to_str().unwrap(), "40 others"];
+    ended.failed_with(&words);
+    ended.prints("no scan was found in the map");
+    let rows = rows(&out);
+    assert_eq!(rows.len(), 20);
+    let is_lost =
+        |(_, status, place): &(i64, String, Option<Pose>)| status == "lost" && place.is_none();
+    assert!(rows.iter().all(is_lost), "{rows:?}");
 }
 
 #[test]

@@ -283,3 +283,25 @@ pub fn check_shared_memory(footprint: &Footprint) -> Result<(), Failure> {
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_for_fixes_that_another_program_has_is_refused_before_the_run() {
+        let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap();
+        let settings = format!(
+            "source.kind=colossus source.address=127.0.0.1:9 run.mode=live run.rate=realtime \
+             slam.kind=graph gnss.kind=udp gnss.listen={address}"
+        );
+        let settings: Vec<String> = settings.split_whitespace().map(str::to_owned).collect();
+        let configuration = Configuration::of_overrides(&settings).unwrap();
+        let refused = check_gnss(&configuration).unwrap_err().to_string();
+        assert!(
+            refused.contains(&format!("{address} (gnss.listen)")),
+            "{refused}"
+        );
+    }
+}

@@ -1,7 +1,7 @@
 //! Stages that keep the contract but for one clause of it. Their results are constant: only the
 //! contract matters here.
 
-use std::{env, fs, thread, time::Duration};
+use std::{env, fs, io, thread, time::Duration};
 
 use gyre_contract::{
     Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId,
@@ -205,10 +205,27 @@ impl Broken<'_> {
         if self.does("is not deterministic") {
             header.rotation.score = clock::now_ns() as f64;
         }
-        if (self.does("sends NaN") && item.seq == WRONG) || self.does("sends only NaN") {
+        let is_wrong = match self.breach {
+            "sends NaN" => item.seq == WRONG,
+            "sends only NaN" => true,
+            // Of all its processes in a run, the first one alone.
+            "sends NaN once" => item.seq == WRONG && self.is_first()?,
+            _ => false,
+        };
+        if is_wrong {
             header.rotation.angle_rad = f64::NAN;
         }
         Ok(Recorded::of::<Rotation>(&header, &[], 0))
+    }
+
+    /// Returns whether this has not been asked before in the run.
+    fn is_first(&self) -> Result<bool, RunError> {
+        match fs::File::create_new(self.launch.manifest.out.join("asked")) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+            created => created
+                .map(|_| true)
+                .map_err(|error| RunError::Input(error.to_string())),
+        }
     }
 
     fn mask(&self, item: Item) -> Recorded {

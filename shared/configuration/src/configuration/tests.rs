@@ -156,7 +156,7 @@ fn a_simulation_has_the_form_that_the_dataset_is_read_in() {
 #[test]
 fn a_resolved_configuration_repeats_itself() {
     let configuration =
-        from("[run]\nrate = 4\n[source]\ndata = '/data'\n[raster]\ncell_m = 0.8\n[stages.masking]\ncommand = ['mine']")
+        from("[run]\nrate = 4\n[source]\ndata = '/data'\n[raster]\ncell_m = 0.8\n[masking]\nthreshold = 70\n[rotation]\nwindow = 'hann'\n[stages.masking]\ncommand = ['mine']")
             .unwrap();
     let text = configuration.to_toml().unwrap();
     assert_eq!(from(&text).unwrap(), configuration);

@@ -233,6 +233,20 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_was_frozen_has_not_stalled() {
+        let plan = plan();
+        let mut stalls = Stalls::of(&plan);
+        stalls.owe(Some(Stall::Pose { limit: LIMIT }));
+        let all_hang = |_: usize, _: Duration| true;
+        let thawed = stalls.looks.last + 60 * RESUMED;
+        assert_eq!(stalls.look(thawed, all_hang, None), Found::default());
+        assert_eq!(stalls.owed, None, "what was due then is due anew");
+        // Those that hang still a moment later do hang.
+        let found = stalls.look(thawed + RESUMED, all_hang, None);
+        assert!(found.stall.is_some());
+    }
+
+    #[test]
     fn a_stage_that_hangs_is_a_stall_and_a_follower_that_hangs_is_none() {
         let plan = plan();
         let mut stalls = Stalls::of(&plan);

@@ -60,14 +60,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let out = Out::lock(folder.path()).unwrap();
         let others = [SIMULATED_TRUTH, "notes.txt"];
-        for name in [&others[..], &["odometry.csv", "map.png"]].concat() {
+        // The judgement of a run with ground truth, and a map.
+        let old = ["errors.svg", "bands.svg", "map.png"];
+        for name in [&others[..], &old, &["odometry.csv"]].concat() {
             fs::write(out.join(name), "old").unwrap();
         }
         let mut files = Files::new(&out);
         files.add("odometry.csv", "new").unwrap();
         files.commit().unwrap();
         assert_eq!(fs::read_to_string(out.join("odometry.csv")).unwrap(), "new");
-        assert!(!out.join("map.png").exists());
+        assert!(!old.iter().any(|name| out.join(name).exists()));
         assert!(others.iter().all(|name| out.join(name).exists()));
     }
 }

@@ -93,3 +93,57 @@ impl GnssSummary {
         Some((refusal, refusal != FixRefusal::Undetermined.to_string()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gyre_geometry::{
+        Twist, pose,
+        samples::{GnssConfig, GnssFix},
+    };
+    use gyre_slam::{EstimatorKind, Fixes, Keyframe};
+    use nalgebra::Matrix3;
+
+    use super::*;
+
+    fn keyframe(k: u64) -> Keyframe {
+        let along = |x_m| UncertainMotion {
+            motion: pose(x_m, 0.0, 0.0),
+            covariance: 0.01 * Matrix3::identity(),
+        };
+        Keyframe {
+            seq: k,
+            scan: k,
+            stamp_ns: 250_000_000 * k as i64,
+            pose: along(2.0 * k as f64),
+            motion: along(2.0),
+            noise: Matrix3::zeros(),
+            twist: Twist::default(),
+            path_m: 2.0 * k as f64,
+            points: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn fixes_that_the_estimator_refuses_are_a_problem_and_place_nothing_on_the_earth() {
+        // They begin an hour after the drive.
+        let later = (0..20).map(|k| GnssFix {
+            stamp_ns: 3_600_000_000_000 + 200_000_000 * k,
+            east_m: k as f64,
+            north_m: 2.0,
+            sigma_m: 1.0,
+        });
+        let fixes = Fixes::new(later.collect(), &GnssConfig::default());
+        let mut estimator = TrajectoryEstimator::new(EstimatorKind::Graph).with_fixes(fixes);
+        for k in 0..4 {
+            estimator.push(&keyframe(k)).unwrap();
+        }
+        estimator.solve().unwrap();
+        let summary = GnssSummary::of(&GnssLog::default(), &mut estimator).unwrap();
+        let reason = FixRefusal::Elsewhere.to_string();
+        assert_eq!(summary.refusal(), Some((reason.as_str(), true)));
+        let figures = serde_json::to_value(&summary).unwrap();
+        assert_eq!(figures["refusal"], reason);
+        assert_eq!(figures["used"], 0);
+        assert!(figures.get("origin").is_none() && figures.get("residual_rms_m").is_none());
+    }
+}

@@ -1,8 +1,8 @@
 //! Samples of inertial sensors and of wheels, and the fixes of GNSS receivers, in bags.
 
 use gyre_datasets::{GnssLog, InspectedLogs, SampleLog, inspect_dataset};
-use gyre_geometry::samples::{Sample, SampleKind};
-use gyre_recording::bags::fixes;
+use gyre_geometry::samples::{GnssConfig, GnssKind, Sample, SampleKind};
+use gyre_recording::{bags::fixes, copied_fixes, gnss_log};
 use gyre_ros2_messages::{
     geometry_msgs::{TwistStamped, Vector3},
     sensor_msgs::{Imu, NavSatFix, NavSatStatus},
@@ -204,6 +204,32 @@ fn a_bag_without_a_receiver_has_no_fixes() {
     let refused = fixes(&path, Some(FIX)).unwrap_err().to_string();
     let words = "on the topic /fix (gnss.topic), and on no other one";
     assert!(refused.contains(words), "{refused}");
+}
+
+#[test]
+fn a_run_takes_the_fixes_of_its_bag_before_a_log_beside_it_and_its_recording_keeps_them() {
+    let folder = Folder::new();
+    let auto = GnssConfig {
+        kind: GnssKind::Auto,
+        ..GnssConfig::default()
+    };
+    let of_run = |path: &Path| gnss_log(&auto, path, Path::new("")).map(Option::unwrap);
+    let path = folder.bag(&b_scans(4));
+    let refused = of_run(&path).unwrap_err().to_string();
+    let words = "has no messages of sensor_msgs/msg/NavSatFix, and no log";
+    assert!(refused.contains(words), "{refused}");
+    let beside = folder.path("gnss.csv");
+    fs::write(&beside, "stamp_s,east_m,north_m\n7,1,2\n").unwrap();
+    assert_eq!(of_run(&path).unwrap().path, beside);
+    let path = folder.bag(&with(&[FIX], |_, _| {}));
+    let log = of_run(&path).unwrap();
+    assert_eq!((&log.path, log.topic.as_deref()), (&path, Some(FIX)));
+    assert_eq!(log.fixes.len() as i64, FIXES);
+    fs::write(&beside, copied_fixes(&auto, &path).unwrap()).unwrap();
+    let kept = GnssLog::read(&beside).unwrap();
+    let stamps = |log: &GnssLog| -> Vec<i64> { log.fixes.iter().map(|it| it.stamp_ns).collect() };
+    assert_eq!(stamps(&kept), stamps(&log));
+    assert_eq!(kept.fixes[2].sigma_m, log.fixes[2].sigma_m);
 }
 
 #[test]
