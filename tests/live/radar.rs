@@ -15,7 +15,7 @@ use rustix::process::Signal;
 use tempfile::TempDir;
 
 use crate::{
-    common::{Ended, Run, gyre, odometry, recording, watch::Watch},
+    common::{Ended, Run, Watch, gyre, odometry, recording},
     operate::commands::ask,
 };
 

@@ -83,7 +83,7 @@ topics! {
             }
         }
     }
-    /// What a live radar has delivered, and what was lost, with each of its scans.
+    /// Counts of the data that a live radar has delivered and of what was lost, with each scan.
     Intake = "intake" {
         IntakeHeader, FloatBlock, by Sender::Stage(&[StageId::RadarReplay]), for [], Latest,
         is [Recorded Linked Replaces]
