@@ -250,4 +250,16 @@ mod tests {
         assert!(!chirps_alternate([0, 1, 0, 1].into_iter()));
         assert!(!chirps_alternate(std::iter::empty()));
     }
+
+    #[test]
+    fn smoothing_a_uniform_sweep_over_zero_changes_nothing() {
+        let angle = |row: u16| f64::from((5000 + 14 * row) % 5600) * (TAU / 5600.0);
+        let azimuth_rad: Vec<f32> = (0..300).map(|row| angle(row) as f32).collect();
+        let stamp_ns = |row: i64| 1_547_131_046_000_000_000 + 625_000 * row;
+        let uniform: Vec<i64> = (0..300).map(stamp_ns).collect();
+        let mut smooth = uniform.clone();
+        smooth_stamps(&azimuth_rad, &mut smooth);
+        let apart = smooth.iter().zip(&uniform).map(|(a, b)| (a - b).abs());
+        assert!(apart.max().unwrap() < 1_000);
+    }
 }
