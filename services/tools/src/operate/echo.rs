@@ -12,7 +12,7 @@ use gyre_client::{AnyMessage, Next, Received, Run};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Message, Pose, Topic};
 
-use crate::operate::choice::RunChoice;
+use crate::operate::{choice::RunChoice, hz};
 
 #[derive(Debug, Args)]
 pub struct EchoArguments {
@@ -23,6 +23,10 @@ pub struct EchoArguments {
     /// Print each message as a line of JSON, with all of its fields but its payload.
     #[arg(long)]
     pub json: bool,
+
+    /// Print the rate of the topic and the delay of its messages, every two seconds.
+    #[arg(long, conflicts_with = "json")]
+    pub hz: bool,
 }
 
 /// Prints a line for each message of a topic, and how many were missed, until the run ends.
@@ -45,7 +49,11 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
         }
     };
     let run = runs.first().copied().cloned();
-    let printed = observe(&RunChoice { run }.folder()?, topic, arguments.json);
+    let run = RunChoice { run }.folder()?;
+    let printed = match arguments.hz {
+        true => hz::measure(&run, topic),
+        false => observe(&run, topic, arguments.json),
+    };
     match printed.map_err(|error| error.downcast::<io::Error>()) {
         Ok(()) => Ok(ExitCode::SUCCESS),
         // Nobody reads it any more, as after `gyre echo OUT | head`.
