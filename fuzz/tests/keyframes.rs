@@ -48,7 +48,7 @@ fn use_log(out: &Path) -> Result<(), Failure> {
 }
 
 /// Changes a word of a record or of its header, and mends their checksums.
-fn change(record: &mut [u8], at: usize, number: u64) {
+pub fn change(record: &mut [u8], at: usize, number: u64) {
     let (header, content) = record.split_at_mut(HEADER);
     let places = MAGIC + content.len() - 8;
     match at % places {

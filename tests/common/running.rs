@@ -84,8 +84,7 @@ impl Running {
     }
 
     pub fn poses(&self) -> usize {
-        let records = journal::records(&journal::path(self.run.out()));
-        records.map_or(0, |records| records.into_iter().flatten().count())
+        journal::poses(self.run.out()).map_or(0, Iterator::count)
     }
 
     pub fn shared_memory_bytes(&self) -> u64 {

@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, fs};
 
 use crate::common::{Run, STAGES, odometry::columns, recording, undisturbed};
-use gyre_journal::{self as journal, Journal};
+use gyre_journal::Journal;
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -101,7 +101,7 @@ fn damages(whole: &[u8]) -> [Vec<u8>; 4] {
 
 /// Appends poses to the journal that the map does not know, as a power failure can leave them.
 fn append_unknown_poses(run: &Run, poses: u64) {
-    let mut journal = Journal::open(&journal::path(run.out())).unwrap();
+    let mut journal = Journal::open(run.out()).unwrap();
     let (last, _) = journal.last(1).unwrap();
     for k in 1..=poses {
         let mut pose = last[0];

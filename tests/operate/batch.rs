@@ -94,8 +94,7 @@ impl Batch<'_> {
     }
 
     fn poses(&self, name: &str) -> usize {
-        let path = journal::path(&self.results(name));
-        journal::records(&path).map_or(0, |records| records.into_iter().flatten().count())
+        journal::poses(&self.results(name)).map_or(0, Iterator::count)
     }
 
     pub fn table(&self) -> String {

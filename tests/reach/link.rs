@@ -277,7 +277,7 @@ fn end(process: &mut Child) {
 }
 
 fn poses(out: &Path) -> usize {
-    journal::records(&journal::path(out)).map_or(0, |records| records.into_iter().flatten().count())
+    journal::poses(out).map_or(0, Iterator::count)
 }
 
 fn await_poses(out: &Path) {

@@ -1,5 +1,5 @@
 //! Files that are whole after a kill and after a power failure: replaced as a whole ([`Draft`]), or
-//! changed in place and synchronised in the background ([`DurableFile`], [`Log`]). Also locks, and
+//! changed in place and synchronised in the background ([`DurableFile`], [`RecordLog`]). Also locks, and
 //! readers of files of unknown origin: no pipes or devices, and up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
@@ -17,6 +17,7 @@ mod log;
 mod quoted;
 #[cfg(feature = "record")]
 pub mod record;
+mod records;
 pub mod shipped;
 
 use std::{
@@ -32,8 +33,9 @@ pub use file::{File, continue_when_full, was_full};
 pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;
 pub use limited::{SETTINGS, open, read_bytes, read_text};
-pub use log::{Log, LogError, LogMagic, LogReader};
+pub use log::{LogError, LogMagic};
 pub use quoted::quoted;
+pub use records::{Record, RecordLog, RecordReader, records_path};
 
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]
