@@ -28,7 +28,8 @@ use std::{
 use thiserror::Error;
 
 pub use draft::{Draft, is_draft, write};
-pub use durable::{Busy, Checksum, DurableFile, Slots, may_begin};
+use durable::may_begin;
+pub use durable::{Busy, DurableFile, Slots, is_sealed, seal};
 pub use file::{File, continue_when_full, was_full};
 pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;

@@ -91,7 +91,7 @@ pub(super) fn encode(index: usize, danger: u32, record: &[u8], bytes: &mut Vec<u
     header
 }
 
-/// Reads a log while another process may append to it. It needs 16 bytes of memory for each record,
+/// Reads a log while another process may append to it. It needs 24 bytes of memory for each record,
 /// and none if all have the same length.
 #[derive(Debug)]
 pub struct LogReader {

@@ -3,7 +3,7 @@
 
 use gyre_geometry::Pose;
 use gyre_matching::{Keyframe, TrackerState};
-use gyre_storage::Checksum;
+use gyre_storage::{is_sealed, seal};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
@@ -61,13 +61,13 @@ fn put(content: &impl Serialize, bytes: &mut [u8]) {
 /// Decodes the content of a slot; `None` if its checksum is wrong.
 fn take<'a, T: Deserialize<'a>>(slot: &'a [u8]) -> Option<T> {
     let (_, content) = slot.split_at_checked(CHECK)?;
-    let whole = Checksum::First.is_right(slot);
+    let whole = is_sealed(slot);
     whole.then(|| postcard::from_bytes(content).ok()).flatten()
 }
 
 pub(super) fn encode_state(state: &State<&[Name]>, slot: &mut [u8]) {
     put(state, &mut slot[CHECK..]);
-    Checksum::First.seal(slot);
+    seal(slot);
 }
 
 pub(super) fn decode_state(slot: &[u8]) -> Option<State<Vec<Name>>> {
@@ -91,7 +91,7 @@ pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) -> Name {
         place.copy_from_slice(cells);
         rest = behind;
     }
-    Checksum::First.seal(slot);
+    seal(slot);
     name(keyframe.id, slot)
 }
 
