@@ -34,8 +34,8 @@ pub type LogMagic = [u8; 16];
 /// The first bytes of all files of Gyre that begin with a magic.
 const OURS: &[u8] = b"gyre ";
 
-/// What the log of a kind begins with, and the length of its records if all have the same: then a
-/// log of any length is opened at once, and in little memory.
+/// The start of a log, and the length of its records if all have the same: then a log of any length
+/// is opened at once, and in little memory.
 #[derive(Clone, Copy, Debug)]
 pub struct LogKind {
     pub magic: LogMagic,

@@ -8,7 +8,7 @@ use std::{
 };
 
 use super::{LogError, LogKind, LogMagic, MAX_BYTES, OURS};
-use crate::{GroupSync, StorageError, may_begin};
+use crate::{GroupSync, StorageError, durable::may_begin};
 
 const HEADER: usize = 20;
 /// A record begins at a multiple of so many bytes.
@@ -272,8 +272,8 @@ impl LogReader {
         Ok(Some(length))
     }
 
-    /// Forgets known records that are not in the file of this length any more. The appending process
-    /// may have cut them off and appended different ones.
+    /// Forgets known records that are not in the file of this length any more. The appending
+    /// process may have cut them off and appended different ones.
     fn keep_unchanged(&mut self, length: u64) -> Result<(), StorageError> {
         while let Some(last) = self.len().checked_sub(1) {
             let (known, before) = match &self.places {
