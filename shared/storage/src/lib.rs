@@ -1,6 +1,6 @@
 //! Files that are whole after a kill and after a power failure: replaced as a whole ([`Draft`]), or
-//! changed in place and synchronised in the background ([`DurableFile`], [`RecordLog`]). Also locks,
-//! and readers of files of unknown origin: no pipes or devices, and up to a size.
+//! changed in place and synchronised in the background ([`DurableFile`], [`RecordLog`]). Also
+//! locks, and readers of files of unknown origin: no pipes or devices, and up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
 //! synchronised. All data that must survive are written through this crate, so that a test can
