@@ -20,8 +20,8 @@ use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 use crate::recordings::folder;
 
 const MAGIC: usize = 16;
-/// A pose, a word, a checksum.
-const RECORD: usize = size_of::<PoseHeader>() + 8;
+const HEADER: usize = 20;
+const RECORD: usize = HEADER + size_of::<PoseHeader>();
 
 /// An edit of a file of records with checksums.
 #[derive(Clone, Debug, TypeGenerator)]
@@ -57,21 +57,21 @@ fn pose(seq: u64) -> PoseHeader {
 }
 
 /// Checks a journal, cuts its torn end, and continues.
-fn use_journal(file: &Path) -> Result<(), Failure> {
-    let content = journal::check(file)?;
+fn use_journal(out: &Path) -> Result<(), Failure> {
+    let content = journal::check(out)?;
     if content.torn > 0 {
-        journal::cut(file, content.poses + u64::from(content.ended))?;
+        journal::cut(out, content.poses + u64::from(content.ended))?;
     }
-    let mut journal = Journal::open(file)?;
+    let mut journal = Journal::open(out)?;
     let (last, ended) = journal.last(3)?;
     assert_eq!(ended, content.ended);
     assert_eq!(last.len() as u64, content.poses.min(3));
     if !ended {
         journal.append(&pose(content.poses))?;
         drop(journal);
-        assert_eq!(journal::check(file)?.poses, content.poses + 1);
+        assert_eq!(journal::check(out)?.poses, content.poses + 1);
     }
-    for pose in journal::records(file)?.into_iter().flatten() {
+    for pose in journal::poses(out)? {
         pose?;
     }
     Ok(())
@@ -81,24 +81,21 @@ fn use_journal(file: &Path) -> Result<(), Failure> {
 fn journals() {
     let (target, folder) = (Target::new(16), folder());
     let file = journal::path(folder.path());
-    let mut journal = Journal::open(&file).unwrap();
+    let mut journal = Journal::open(folder.path()).unwrap();
     (0..4).for_each(|seq| journal.append(&pose(seq)).unwrap());
     drop(journal);
     let valid = fs::read(&file).unwrap();
     assert_eq!(valid.len(), MAGIC + 4 * RECORD);
-    use_journal(&file).unwrap();
+    use_journal(folder.path()).unwrap();
     let word = |bytes: &mut [u8], index: usize, at: usize, number: u64| {
         let records = bytes.get_mut(MAGIC..).unwrap_or_default();
         if let Some(record) = records.chunks_exact_mut(RECORD).nth(index % 5) {
-            let (content, check) = record.split_at_mut(RECORD - 4);
-            let at = at % (content.len() - 8);
-            content[at..at + 8].copy_from_slice(&number.to_le_bytes());
-            check.copy_from_slice(&crc32fast::hash(content).to_le_bytes());
+            change(record, at, number);
         }
     };
     check!().with_type::<Vec<Edit>>().for_each(|edits| {
         fs::write(&file, edited(&valid, edits, word)).unwrap();
-        target.run(|| use_journal(&file));
+        target.run(|| use_journal(folder.path()));
     });
 }
 
@@ -190,9 +187,6 @@ fn slots(file: &[u8]) -> Vec<std::ops::Range<usize>> {
 }
 
 const KEYFRAMES: usize = 4;
-/// The header of a record: its number, its length, and the checksums of its bytes and of the
-/// header.
-const HEADER: usize = 20;
 
 fn keyframe(seq: usize) -> Keyframe {
     Keyframe {

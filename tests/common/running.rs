@@ -19,8 +19,7 @@ use super::{
 
 /// The poses in the journal of a run, its end among them.
 pub fn poses_of(out: &Path) -> usize {
-    let records = journal::records(&journal::path(out));
-    records.map_or(0, |records| records.into_iter().flatten().count())
+    journal::poses(out).map_or(0, Iterator::count)
 }
 
 /// A running command. Dropped before its end, it is killed.

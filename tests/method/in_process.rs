@@ -35,8 +35,7 @@ fn register_all(run: &Run) -> Vec<Registered> {
 
 pub fn assert_same_bits(run: &Run) -> usize {
     run.complete();
-    let journal = journal::records(&journal::path(run.out()))
-        .unwrap()
+    let journal = journal::poses(run.out())
         .unwrap()
         .collect::<Result<Vec<_>, _>>()
         .unwrap();

@@ -12,7 +12,7 @@ use crate::{
     },
     restart::results::interrupted,
 };
-use gyre_journal::{self as journal, Journal};
+use gyre_journal::Journal;
 use serde_json::Value;
 
 const REFINEMENT: &str = "refinement";
@@ -88,7 +88,7 @@ fn damage(run: &Run) {
 
 /// Appends poses to the journal that the map does not know, as a power failure can leave them.
 fn append_unknown_poses(run: &Run, poses: u64) {
-    let mut journal = Journal::open(&journal::path(run.out())).unwrap();
+    let mut journal = Journal::open(run.out()).unwrap();
     let (last, _) = journal.last(1).unwrap();
     for k in 1..=poses {
         let mut pose = last[0];

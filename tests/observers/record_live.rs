@@ -24,8 +24,7 @@ fn played() -> Run {
 
 /// The scans of the poses in the results by their numbers.
 fn scans_of_poses(run: &Run) -> BTreeMap<u64, u64> {
-    let records = journal::records(&journal::path(run.out()));
-    let poses = records.unwrap().unwrap();
+    let poses = journal::poses(run.out()).unwrap();
     let poses = poses.map(|pose| pose.unwrap().item);
     let poses = poses.filter(|item| !item.is(flag::END));
     poses.map(|item| (item.seq, item.scan)).collect()

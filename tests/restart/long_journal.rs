@@ -76,40 +76,29 @@ fn pose(seq: u64) -> PoseHeader {
 }
 
 fn forge(out: &Path, poses: u64) {
-    let mut journal = Journal::open(&journal::path(out)).unwrap();
+    let mut journal = Journal::open(out).unwrap();
     (0..poses).for_each(|seq| journal.append(&pose(seq)).unwrap());
     let mut end = pose(poses);
     end.item.flags = flag::END;
     journal.append(&end).unwrap();
 }
 
-/// The length is real and the content is not: unread parts may be a hole.
 #[test]
 fn a_restart_reads_the_end_alone() {
     let (folder, poses) = (folder(), poses());
-    forge(folder.path(), LAST as u64 + 2);
+    forge(folder.path(), poses);
     let path = journal::path(folder.path());
-    let short = fs::read(&path).unwrap();
-    let record = (short.len() - 16) / (LAST + 3);
-    let length = 16 + poses * record as u64;
+    let length = fs::metadata(&path).unwrap().len();
+    // Damage that is found only by what reads it.
     let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
-    file.set_len(length).unwrap();
-    // Valid records with the numbers of their places, made by a journal of their own.
-    let tail = tempfile::tempdir_in(folder.path()).unwrap();
-    let first = poses - LAST as u64;
-    let mut at = Journal::open(&journal::path(tail.path())).unwrap();
-    (0..LAST as u64).for_each(|k| at.append(&pose(first + k)).unwrap());
-    drop(at);
-    let bytes = fs::read(journal::path(tail.path())).unwrap();
-    file.write_all_at(&bytes[16..], 16 + first * record as u64)
-        .unwrap();
+    file.write_all_at(&[0x55; 4096], length / 2).unwrap();
     let (before, since) = (peak_mb(), Instant::now());
-    let journal = Journal::open(&path).unwrap();
+    let mut journal = Journal::open(folder.path()).unwrap();
     let (last, ended) = journal.last(LAST).unwrap();
     let (took, peak) = (since.elapsed(), peak_mb());
     assert_eq!(
         (last.len(), last[LAST - 1].item.seq, ended),
-        (LAST, poses - 1, false)
+        (LAST, poses - 1, true)
     );
     println!(
         "{poses} poses, {:.1} GB: opened in {took:?}, peak {peak:.1} MB ({before:.1} before)",
@@ -123,7 +112,7 @@ fn a_check_and_results_take_bounded_memory() {
     let (folder, poses) = (folder(), poses());
     forge(folder.path(), poses);
     let since = Instant::now();
-    let content = journal::check(&journal::path(folder.path())).unwrap();
+    let content = journal::check(folder.path()).unwrap();
     assert_eq!(
         (content.poses, content.ended, content.torn),
         (poses, true, 0)

@@ -220,7 +220,7 @@ fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
     bytes[1000] ^= 4;
     fs::write(&journal, &bytes).unwrap();
     run.finish().refused_with(&[
-        "poses.journal is damaged at pose 1,",
+        "poses.journal is damaged at record 1,",
         "kept as",
         "poses.journal.damaged",
         "another --out",

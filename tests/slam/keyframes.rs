@@ -21,9 +21,7 @@ fn a_run_with_slam_has_the_same_odometry_and_logs_the_keyframes_of_its_poses() {
     assert_eq!(run.complete(), undisturbed());
     let mut keyframes = RecordReader::<Keyframe>::open(run.out()).unwrap();
     assert!(keyframes.has_ended());
-    let poses = journal::records(&journal::path(run.out()))
-        .unwrap()
-        .unwrap();
+    let poses = journal::poses(run.out()).unwrap();
     let poses: Vec<_> = poses.map(Result::unwrap).collect();
     let expected = 3..=poses.len();
     assert!(expected.contains(&keyframes.len()), "{}", keyframes.len());
@@ -74,7 +72,7 @@ fn a_keyframe_without_its_pose_is_cut_off_and_poses_without_their_keyframe_are_c
         if lost == "pose" {
             let (poses, last) = (poses_of(&run), last_keyframe(&run));
             assert!(last > 0 && last < poses);
-            journal::cut(&journal::path(run.out()), last).unwrap();
+            journal::cut(run.out(), last).unwrap();
         } else {
             let mut log = RecordLog::<Keyframe>::open(run.out()).unwrap();
             log.cut(log.len() - 1).unwrap();
@@ -85,7 +83,7 @@ fn a_keyframe_without_its_pose_is_cut_off_and_poses_without_their_keyframe_are_c
 }
 
 fn poses_of(run: &Run) -> u64 {
-    journal::check(&journal::path(run.out())).unwrap().poses
+    journal::check(run.out()).unwrap().poses
 }
 
 fn last_keyframe(run: &Run) -> u64 {

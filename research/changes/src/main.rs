@@ -105,7 +105,7 @@ fn survey(
     }
     let mut path_m = Vec::new();
     for index in 0..placed.poses.len() {
-        path_m.push(keyframes.read_without_points(index)?.path_m);
+        path_m.push(Keyframe::without_points(keyframes, index)?.path_m);
     }
     let near = near_fixes(&path_m, placed);
     for (index, pose) in placed.poses.iter().enumerate() {

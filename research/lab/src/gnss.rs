@@ -112,7 +112,7 @@ impl Drive {
         };
         let mut drive = Self {
             keyframes: (0..keyframes.len())
-                .map(|index| keyframes.read_without_points(index))
+                .map(|index| Keyframe::without_points(&mut keyframes, index))
                 .collect::<Result<_, _>>()?,
             queries: (0..loops)
                 .map(|index| queries.read(index))

@@ -17,7 +17,7 @@ use gyre_contract::{
     run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side},
 };
 use gyre_journal::{
-    self as journal, Content, JournalError,
+    self as journal, Content,
     checkpoint::{self, Checkpoint},
     keyframes::complete_poses,
     objects::LoggedObjects,
@@ -68,16 +68,16 @@ impl Earlier {
         programs: &Programs,
         fresh: bool,
     ) -> Result<Self, Failure> {
-        let path = journal::path(out.path());
-        // A file of another program is refused in any case.
-        let there = match journal::records(&path) {
-            Err(JournalError::OtherVersion { .. }) if fresh => true,
-            Err(error @ JournalError::OtherVersion { .. }) => {
+        match journal::poses(out.path()).map(drop) {
+            Err(error @ LogError::OtherVersion { .. }) if !fresh => {
                 let reason = format!("{error}, or begin anew with --fresh");
                 return Ok(Self::Foreign(reason.into()));
             }
-            records => records?.is_some(),
-        };
+            // Where another run may begin, so may this one; damage is reported below.
+            Err(LogError::OtherVersion { .. } | LogError::Damaged { .. }) => {}
+            // A file of another program is refused in any case.
+            opened => opened?,
+        }
         settle(out)?;
         if fresh {
             return Ok(Self::Nothing);
@@ -86,15 +86,12 @@ impl Earlier {
             let complete = complete(out, configuration, programs);
             return Ok(complete.unwrap_or_else(Self::Foreign));
         }
-        if !there {
+        let content = journal::check(out.path()).map_err(|error| kept(error, out))?;
+        if content.poses == 0 && !content.ended {
             return Ok(match require_no_results(out) {
                 Ok(()) => without_poses(out, configuration, programs),
                 Err(reason) => Self::Foreign(reason),
             });
-        }
-        let content = journal::check(&path).map_err(|error| kept(error, &path))?;
-        if content.poses == 0 && !content.ended {
-            return Ok(without_poses(out, configuration, programs));
         }
         match same_run(out, configuration, programs, UNFINISHED) {
             Err(reason) => Ok(Self::Foreign(reason)),
@@ -243,10 +240,11 @@ fn has_ended<R: gyre_slam::Record>(out: &Out) -> Result<bool, Failure> {
 }
 
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.
-fn kept(error: JournalError, path: &Path) -> Failure {
-    if !matches!(error, JournalError::Damaged { .. }) {
+fn kept(error: LogError, out: &Out) -> Failure {
+    if !matches!(error, LogError::Damaged { .. }) {
         return error.into();
     }
+    let path = &journal::path(out.path());
     let copy = path.with_extension("journal.damaged");
     // A link, because a long journal may not fit a second time.
     let kept = match fs::hard_link(path, &copy) {
@@ -275,7 +273,7 @@ fn known_poses(
         false => content.poses,
     };
     let complete = match configuration.objects.is_on() {
-        true => complete_scans(out.path(), complete).map_err(|error| damaged(error.into()))?,
+        true => complete_scans(out.path(), complete).map_err(damaged)?,
         false => complete,
     };
     if !configuration.starts(StageId::Refinement) {
@@ -308,7 +306,7 @@ fn known_poses(
             ));
             Ok(0)
         }
-        None => Err(JournalError::no_state(&path, content.poses).into()),
+        None => Err(checkpoint::no_state(&path, content.poses).into()),
     }
 }
 
@@ -344,9 +342,9 @@ pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
     Ok(Out::lock(path)?)
 }
 
-fn damaged(error: JournalError) -> Failure {
+fn damaged(error: LogError) -> Failure {
     match error {
-        JournalError::Log(LogError::Damaged { .. }) => format!(
+        LogError::Damaged { .. } => format!(
             "{error}: restore it from a backup, choose another --out, or begin anew with --fresh"
         )
         .into(),
@@ -444,7 +442,7 @@ pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
 /// failure, and writes `config.toml` again if it differs from the run's first configuration.
 pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
     if begun.lost > 0 {
-        journal::cut(&journal::path(out.path()), begun.poses)?;
+        journal::cut(out.path(), begun.poses)?;
     }
     let (path, identity) = (out.join(CONFIGURATION), &begun.identity);
     let found = storage::read_text(&path, storage::SETTINGS).ok();

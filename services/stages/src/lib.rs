@@ -2,7 +2,7 @@
 
 use gyre_contract::Masked;
 use gyre_geometry::SparsePoint;
-use gyre_journal::JournalError;
+use gyre_storage::LogError;
 use gyre_transport::{RunError, reader::Received};
 
 pub mod estimates;
@@ -15,10 +15,10 @@ pub mod refinement;
 pub mod search;
 
 /// The error for a file of the run: a process that was killed, and is not gone yet, may have it.
-fn unusable(error: JournalError) -> RunError {
-    match error.is_busy() {
-        true => RunError::Transient(format!("cannot open a file of the run: {error}")),
-        false => RunError::input(error),
+fn unusable(error: LogError) -> RunError {
+    match error {
+        LogError::Busy(_) => RunError::Transient(format!("cannot open a file of the run: {error}")),
+        _ => RunError::input(error),
     }
 }
 

@@ -5,7 +5,7 @@
 use gyre_contract::{
     Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag, run::StageCounters,
 };
-use gyre_journal::{self as journal, Journal, PoseLog, keyframes::Keyframes, scans::Scans};
+use gyre_journal::{Journal, PoseLog, keyframes::Keyframes, scans::Scans};
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{Launch, Sink, sink};
@@ -24,7 +24,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     }
     let slam: SlamConfig = launch.section("slam")?;
     let objects: ObjectsConfig = launch.section("objects")?;
-    let journal = Journal::open(&journal::path(out)).map_err(unusable)?;
+    let mut journal = Journal::open(out).map_err(unusable)?;
     let (newest, ended) = journal.last(1).map_err(unusable)?;
     let last = newest.last().copied();
     let known = last.map_or(0, |last| last.item.seq.saturating_add(1));

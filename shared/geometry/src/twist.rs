@@ -1,9 +1,10 @@
 use nalgebra::{Rotation2, Translation2, UnitComplex, Vector2};
+use serde::{Deserialize, Serialize};
 
 use crate::Pose;
 
 /// A constant velocity in the moving frame: motion along a circular arc or a straight line.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Twist {
     pub vx_mps: f64,
     pub vy_mps: f64,

@@ -1,5 +1,4 @@
-//! A file that one process at a time changes in place: the common part of logs, of the journal and
-//! of checkpoints.
+//! A file that one process at a time changes in place: the common part of logs and of checkpoints.
 
 use std::path::{Path, PathBuf};
 
@@ -41,7 +40,7 @@ impl DurableFile {
     }
 
     /// Fills `bytes` with the content of a slot; false if the file ends before.
-    /// [`Checksum::is_right`] checks whether it is whole.
+    /// [`is_sealed`] checks whether it is whole.
     pub fn read(&self, slots: &Slots, slot: u64, bytes: &mut [u8]) -> Result<bool, StorageError> {
         self.file.read_at(bytes, slots.offset(slot))
     }
@@ -54,7 +53,7 @@ impl DurableFile {
 
 /// Returns whether a file with these first bytes may be one that begins with `magic`: a death or a
 /// power failure leaves a beginning of it, and zeros behind it.
-pub fn may_begin(found: &[u8], magic: &[u8; 16]) -> bool {
+pub(crate) fn may_begin(found: &[u8], magic: &[u8; 16]) -> bool {
     let bytes = found.iter().zip(magic);
     let mut other = bytes.skip_while(|(found, magic)| found == magic);
     other.all(|(found, _)| *found == 0)
@@ -73,42 +72,19 @@ impl Slots {
     }
 }
 
-/// The place of a CRC-32 that proves the content of a slot whole. Numbers are little-endian.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Checksum {
-    /// The first eight bytes, with one more bit set: it is never zero, as in an empty slot.
-    First,
-    /// The last four bytes.
-    Last,
+/// Writes a checksum over the first eight bytes of a slot that proves the others whole.
+pub fn seal(slot: &mut [u8]) {
+    let (check, content) = slot.split_at_mut(8);
+    check.copy_from_slice(&never_zero(content));
 }
 
-impl Checksum {
-    pub fn seal(self, slot: &mut [u8]) {
-        match self {
-            Self::First => {
-                let (check, content) = slot.split_at_mut(8);
-                check.copy_from_slice(&never_zero(content));
-            }
-            Self::Last => {
-                let (content, check) = slot.split_at_mut(slot.len() - 4);
-                check.copy_from_slice(&crc32fast::hash(content).to_le_bytes());
-            }
-        }
-    }
-
-    #[must_use]
-    pub fn is_right(self, slot: &[u8]) -> bool {
-        match self {
-            Self::First => slot
-                .split_first_chunk()
-                .is_some_and(|(check, content)| *check == never_zero(content)),
-            Self::Last => slot
-                .split_last_chunk()
-                .is_some_and(|(content, check)| *check == crc32fast::hash(content).to_le_bytes()),
-        }
-    }
+#[must_use]
+pub fn is_sealed(slot: &[u8]) -> bool {
+    slot.split_first_chunk()
+        .is_some_and(|(check, content)| *check == never_zero(content))
 }
 
+/// The CRC-32, little-endian, with one more bit set: an empty slot has zero.
 fn never_zero(content: &[u8]) -> [u8; 8] {
     (1 << 32 | u64::from(crc32fast::hash(content))).to_le_bytes()
 }
@@ -127,29 +103,16 @@ mod tests {
 
     #[test]
     fn a_slot_is_whole_until_one_of_its_bytes_changes() {
-        for checksum in [Checksum::First, Checksum::Last] {
-            let mut slot = [7; 24];
-            checksum.seal(&mut slot);
-            assert!(checksum.is_right(&slot));
-            for at in 0..slot.len() {
-                let mut other = slot;
-                other[at] ^= 1;
-                assert!(!checksum.is_right(&other), "{checksum:?}, byte {at}");
-            }
-            assert!(!checksum.is_right(&[]));
+        let mut slot = [7; 24];
+        seal(&mut slot);
+        assert!(is_sealed(&slot));
+        for at in 0..slot.len() {
+            let mut other = slot;
+            other[at] ^= 1;
+            assert!(!is_sealed(&other), "byte {at}");
         }
-        assert!(!Checksum::First.is_right(&[0; 24]), "it is empty");
-    }
-
-    /// Files of earlier versions stay readable.
-    #[test]
-    fn checksums_are_where_they_have_always_been() {
-        let mut slot = *b"????????123456789";
-        Checksum::First.seal(&mut slot);
-        assert_eq!(slot[..8], [0x26, 0x39, 0xf4, 0xcb, 1, 0, 0, 0]);
-        let mut slot = *b"123456789????";
-        Checksum::Last.seal(&mut slot);
-        assert_eq!(slot[9..], [0x26, 0x39, 0xf4, 0xcb]);
+        assert!(!is_sealed(&[]));
+        assert!(!is_sealed(&[0; 24]), "it is empty");
     }
 
     #[test]

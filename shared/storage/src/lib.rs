@@ -1,6 +1,6 @@
 //! Files that are whole after a kill and after a power failure: replaced as a whole ([`Draft`]), or
-//! changed in place and synchronised in the background ([`DurableFile`], [`Log`]). Also locks, and
-//! readers of files of unknown origin: no pipes or devices, and up to a size.
+//! changed in place and synchronised in the background ([`DurableFile`], [`RecordLog`]). Also
+//! locks, and readers of files of unknown origin: no pipes or devices, and up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
 //! synchronised. All data that must survive are written through this crate, so that a test can
@@ -17,6 +17,7 @@ mod log;
 mod quoted;
 #[cfg(feature = "record")]
 pub mod record;
+mod records;
 pub mod shipped;
 
 use std::{
@@ -27,13 +28,14 @@ use std::{
 use thiserror::Error;
 
 pub use draft::{Draft, is_draft, write};
-pub use durable::{Busy, Checksum, DurableFile, Slots, may_begin};
+pub use durable::{Busy, DurableFile, Slots, is_sealed, seal};
 pub use file::{File, continue_when_full, was_full};
 pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;
 pub use limited::{SETTINGS, open, read_bytes, read_text};
-pub use log::{Log, LogError, LogMagic, LogReader};
+pub use log::{LogError, LogMagic};
 pub use quoted::quoted;
+pub use records::{Record, RecordLog, RecordReader, records_path};
 
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]

@@ -5,9 +5,14 @@
 //! [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) records. Those are cut off when the log is opened;
 //! any other damaged record is refused with its number.
 //!
-//! Layout, little-endian: 16 bytes of magic; then for each record its number (u64), its length in
-//! bytes (u32), the CRC-32 of its bytes (u32), the CRC-32 of these three (u32), its bytes, and
-//! zeros up to a multiple of four. So the same records are the same file.
+//! Layout, little-endian: 16 bytes of magic; then for each record its number (u32), its danger
+//! (u32), its length in bytes (u32), the CRC-32 of its bytes (u32), the CRC-32 of these four (u32),
+//! its bytes, and zeros up to a multiple of four.
+//!
+//! The danger of a record is one more than the number of records before it that were not known to
+//! survive a power failure when it was written. It tells recent records from damaged ones. It is
+//! zero, which says nothing, unless all records have the same length: so the same records of
+//! different lengths are the same file.
 
 mod reader;
 #[cfg(test)]
@@ -26,6 +31,16 @@ use reader::encode;
 
 /// The start of a log: the kind of its records, and their version.
 pub type LogMagic = [u8; 16];
+/// The first bytes of all files of Gyre that begin with a magic.
+const OURS: &[u8] = b"gyre ";
+
+/// The start of a log, and the length of its records if all have the same: then a log of any length
+/// is opened at once, and in little memory.
+#[derive(Clone, Copy, Debug)]
+pub struct LogKind {
+    pub magic: LogMagic,
+    pub length: Option<usize>,
+}
 
 /// The longest record. So the memory for reading one is bounded, even for a damaged file.
 const MAX_BYTES: usize = 16 << 20;
@@ -36,14 +51,19 @@ const MANY: usize = 4096;
 pub enum LogError {
     #[error(transparent)]
     Storage(#[from] StorageError),
-    #[error("{path} is not a log of this kind and version: move it away, or choose another --out")]
+    #[error("{path} is not a file of Gyre: move it away, or choose another --out")]
     Foreign { path: PathBuf },
+    #[error("{path} is of another version of Gyre: use that one, or choose another --out")]
+    OtherVersion { path: PathBuf },
     /// The record of this number, from 0.
     #[error("{path} is damaged at record {record}, although it had been written whole")]
     Damaged { path: PathBuf, record: usize },
     /// A record is undamaged, but of a different kind than this log.
     #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
     Malformed { path: PathBuf, record: usize },
+    /// A file lacks records that another one relies on.
+    #[error("{0}")]
+    Missing(String),
     #[error(transparent)]
     Busy(#[from] Busy),
 }
@@ -52,6 +72,7 @@ pub enum LogError {
 pub struct Log {
     file: DurableFile,
     records: LogReader,
+    /// Changes that were counted since the log was opened.
     changes: u64,
     /// Their number when the last record was appended.
     appended: u64,
@@ -60,15 +81,15 @@ pub struct Log {
 
 impl Log {
     /// Opens or creates a log, and cuts off incomplete last records, left by a death or a power
-    /// failure. Of the others only the headers are read. The contents of the log then survive a
-    /// power failure.
-    pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
-        let mut records = LogReader::new(path, magic);
+    /// failure. Of the others only the headers are read, or nothing if all have the same length.
+    /// The contents of the log then survive a power failure.
+    pub fn open(path: &Path, kind: LogKind) -> Result<Self, LogError> {
+        let mut records = LogReader::new(path, kind);
         let file = DurableFile::open(path, |file| {
             records.refresh()?;
             if !records.has_magic {
                 file.set_length(0)?;
-                file.write_at(&magic, 0)?;
+                file.write_at(&kind.magic, 0)?;
                 records.refresh()?;
             }
             file.cut_to(records.end())?;
@@ -104,7 +125,7 @@ impl Log {
             let too_long = io::ErrorKind::FileTooLarge.into();
             return Err(StorageError::at("write", self.file.file.path())(too_long).into());
         }
-        let header = encode(self.len(), record, &mut self.buffer);
+        let header = encode(self.len(), self.danger(), record, &mut self.buffer);
         self.file.file.write_at(&self.buffer, self.records.end())?;
         self.file.file.require_name()?;
         self.records.push(header);
@@ -122,6 +143,14 @@ impl Log {
         }
     }
 
+    fn danger(&self) -> u32 {
+        let in_danger = self.changes - self.file.sync.safe().unwrap_or(0);
+        match self.records.has_one_length() {
+            true => 1 + in_danger as u32,
+            false => 0,
+        }
+    }
+
     fn count(&mut self) -> Result<(), LogError> {
         self.changes += 1;
         Ok(self.file.sync.changed()?)
@@ -134,7 +163,7 @@ impl Log {
     }
 
     pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
-        self.records.read(index, bytes)
+        self.records.read(index, bytes).map(drop)
     }
 
     pub fn malformed(&self, index: usize) -> LogError {

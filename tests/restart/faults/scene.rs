@@ -129,8 +129,7 @@ impl<'a> Scene<'a> {
 
     /// The same command must make the run complete, and lose none of the poses that are there.
     pub fn resumed(&self, run: &Run) {
-        let records = journal::records(&journal::path(run.out())).unwrap();
-        let records: Result<Vec<_>, _> = records.into_iter().flatten().collect();
+        let records: Result<Vec<_>, _> = journal::poses(run.out()).unwrap().collect();
         let records = records.unwrap();
         run.finish().succeeded();
         self.assert_complete(run, &self.configuration.undisturbed().results);

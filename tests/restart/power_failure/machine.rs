@@ -155,7 +155,7 @@ impl Stages {
         let refiner = Refiner::new(config, POINTS)?;
         let cells = refiner.keyframe_cells();
         let checkpoint = Checkpoint::open(&checkpoint::path(out), WINDOW, config.keyframes, cells)?;
-        let journal = Journal::open(&journal::path(out))?;
+        let mut journal = Journal::open(out)?;
         let (mut poses, ended) = journal.last(1)?;
         let last = poses.pop();
         let slam = &configuration.slam;

@@ -6,9 +6,9 @@ use std::{ffi::OsStr, fs, path::Path};
 
 use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::{flag, run::COMPLETE};
-use gyre_journal::{self as journal, JournalError};
+use gyre_journal as journal;
 use gyre_results::{Out, REPLACED as ASIDE, SIMULATED_TRUTH};
-use gyre_storage::{self as storage, StorageError};
+use gyre_storage::{self as storage, LogError, StorageError};
 
 use super::{CONFIGURATION, is_complete, state};
 
@@ -57,12 +57,12 @@ pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
     if !is_whole(out) {
         return Ok(false);
     }
-    let records = match journal::records(&journal::path(out.path())) {
-        // Another version has begun there.
-        Err(JournalError::OtherVersion { .. }) => return Ok(false),
+    let records = match journal::poses(out.path()) {
+        // Another version has begun there, or what was computed is damaged.
+        Err(LogError::OtherVersion { .. } | LogError::Damaged { .. }) => return Ok(false),
         records => records?,
     };
-    let poses = records.into_iter().flatten().filter(|record| {
+    let poses = records.filter(|record| {
         let is_end = record.as_ref().is_ok_and(|pose| pose.item.is(flag::END));
         !is_end
     });
@@ -146,7 +146,7 @@ mod tests {
     use super::{super::make_way, *};
 
     fn compute(out: &Out, poses: Range<u64>) {
-        let mut journal = Journal::open(&journal::path(out.path())).unwrap();
+        let mut journal = Journal::open(out.path()).unwrap();
         for seq in poses {
             let pose = PoseHeader {
                 item: Item::numbered(seq),

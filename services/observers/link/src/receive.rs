@@ -13,7 +13,7 @@ use std::{
 
 use gyre_client::{Manifest, RunError, Signals, log};
 use gyre_contract::{run::LinkConfig, topic};
-use gyre_journal::{self as journal, Journal};
+use gyre_journal::Journal;
 use gyre_supervise::rig::Rig;
 use zenoh::{Session, Wait};
 
@@ -90,8 +90,8 @@ pub fn receive(
     signals: &Signals,
 ) -> Result<Received, RunError> {
     let manifest = remote.manifest(out);
-    let journal = Journal::open(&journal::path(&manifest.out)).map_err(RunError::input)?;
-    let next_pose = next_pose(&journal, &remote.offer, out)?;
+    let mut journal = Journal::open(&manifest.out).map_err(RunError::input)?;
+    let next_pose = next_pose(&mut journal, &remote.offer, out)?;
     let guardian = [gyre, "guard".to_owned()];
     let rig = Rig::new(manifest, &remote.offer.configuration, &guardian, signals);
     let mut rig = rig.map_err(RunError::input)?;
@@ -139,7 +139,7 @@ fn receiver(out: &Path, session: &Session) -> Result<String, RunError> {
     }
 }
 
-fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, RunError> {
+fn next_pose(journal: &mut Journal, offer: &RunOffer, out: &Path) -> Result<u64, RunError> {
     let (last, ended) = journal.last(1).map_err(RunError::input)?;
     let Some(last) = last.first() else {
         return Ok(0);

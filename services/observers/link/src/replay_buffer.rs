@@ -164,13 +164,10 @@ impl LogBuffer {
     }
 
     pub fn of_poses(out: &Path) -> Self {
-        let path = journal::path(out);
+        let out = out.to_owned();
         Self::of(Box::new(move |seq| {
-            let Some(mut records) = journal::records_from(&path, seq).map_err(RunError::input)?
-            else {
-                return Ok(None);
-            };
-            let pose = records.next().transpose().map_err(RunError::input)?;
+            let mut poses = journal::poses_from(&out, seq).map_err(RunError::input)?;
+            let pose = poses.next().transpose().map_err(RunError::input)?;
             let pose = pose.filter(|pose| !pose.item.is(flag::END));
             Ok(pose.map(|pose| bytemuck::bytes_of(&pose).to_vec()))
         }))

@@ -12,7 +12,7 @@ use gyre_contract::{
     Hop, Item, Masked, Message as _, Motion, MotionHeader, Pose, PoseHeader, StageId, flag,
     run::{LinkConfig, PlayedFrom, Side, StageCounters},
 };
-use gyre_journal::{self as journal, Journal};
+use gyre_journal::Journal;
 use gyre_stage::{Launch, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority};
 
@@ -30,7 +30,7 @@ use crate::{
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let config: LinkConfig = launch.section("link")?;
-    let journal = Journal::open(&journal::path(&launch.manifest.out)).map_err(RunError::input)?;
+    let journal = Journal::open(&launch.manifest.out).map_err(RunError::input)?;
     let mut stages = LastStages::open(launch, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || stages.sleep(waker.descriptor());
@@ -98,13 +98,14 @@ impl Robot<'_> {
         if !self.catch_up(&poses, received)? {
             return Ok(());
         }
-        self.stages.republish(&self.last_poses()?.0)?;
+        let (last, _) = self.last_poses()?;
+        self.stages.republish(&last)?;
         self.stages.has_handed_over(0)?;
         self.relay(&poses)
     }
 
     /// Returns the newest poses of the journal, to be published again, and whether it has ended.
-    fn last_poses(&self) -> Result<(Vec<PoseHeader>, bool), RunError> {
+    fn last_poses(&mut self) -> Result<(Vec<PoseHeader>, bool), RunError> {
         let poses = self.journal.last(self.stages.history().max(1));
         poses.map_err(RunError::input)
     }

@@ -89,8 +89,8 @@ pub(crate) fn offer_key(name: &str) -> String {
 
 /// Returns the time of the first pose in a folder, ns since 1970.
 pub(crate) fn began_ns(out: &Path) -> Result<Option<i64>, RunError> {
-    let records = journal::records(&journal::path(out)).map_err(RunError::input)?;
-    let first = records.into_iter().flatten().next().transpose();
+    let mut poses = journal::poses(out).map_err(RunError::input)?;
+    let first = poses.next().transpose();
     Ok(first
         .map_err(RunError::input)?
         .map(|pose| pose.item.stamp_ns))

@@ -123,7 +123,7 @@ impl LiveMap {
 
     fn read(&mut self) -> Result<(), LiveMapError> {
         for index in self.seqs.len()..self.keyframes.len() {
-            let keyframe = self.keyframes.read_without_points(index)?;
+            let keyframe = Keyframe::without_points(&mut self.keyframes, index)?;
             self.estimator.push(&keyframe)?;
             self.seqs.push(keyframe.seq);
         }

@@ -11,14 +11,14 @@ use gyre_journal as journal;
 const PART: usize = 2000;
 
 pub(crate) struct JournalTrack {
-    journal: PathBuf,
+    out: PathBuf,
     next: u64,
 }
 
 impl JournalTrack {
     pub fn of(out: &Path) -> Self {
         Self {
-            journal: journal::path(out),
+            out: out.to_owned(),
             next: 0,
         }
     }
@@ -31,8 +31,8 @@ impl JournalTrack {
             return false;
         }
         if seq > self.next {
-            let records = journal::records_from(&self.journal, self.next);
-            let records = records.ok().flatten().into_iter().flatten();
+            let records = journal::poses_from(&self.out, self.next);
+            let records = records.into_iter().flatten();
             // Poses that the journal lacks are not drawn.
             let before = records.map_while(Result::ok);
             let before = before.take_while(|before| before.item.seq < seq);
@@ -50,8 +50,6 @@ impl JournalTrack {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use gyre_contract::Item;
     use gyre_journal::Journal;
 
@@ -67,9 +65,7 @@ mod tests {
     #[test]
     fn the_poses_of_the_journal_are_drawn_once_and_the_newest_poses_follow_them() {
         let out = tempfile::tempdir().unwrap();
-        let path = journal::path(out.path());
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        let mut journal = Journal::open(&path).unwrap();
+        let mut journal = Journal::open(out.path()).unwrap();
         let poses = 2 * PART as u64 + 10;
         (0..poses).for_each(|seq| journal.append(&pose(seq)).unwrap());
         let mut track = JournalTrack::of(out.path());

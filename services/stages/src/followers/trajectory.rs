@@ -99,7 +99,7 @@ impl Trajectory {
     fn advance(&mut self) -> Result<bool, RunError> {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {
-            let keyframe = self.keyframes.read_without_points(keyframes)?;
+            let keyframe = Keyframe::without_points(&mut self.keyframes, keyframes)?;
             let fixes = self.estimator.fixes().settled();
             self.estimator.push(&keyframe).map_err(RunError::input)?;
             // Without a new loop or fix the poses before stay where they are.

@@ -17,7 +17,7 @@ use gyre_contract::{
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
 use gyre_geometry::{LostAzimuths, Pose};
 use gyre_journal::{
-    self as journal, JournalError,
+    self as journal,
     objects::{LoggedObjects, listed},
 };
 use gyre_radar::Trajectory;
@@ -27,6 +27,7 @@ use gyre_recording::{
 };
 use gyre_ros2_messages::{Vehicle, frames::occupancy_grid};
 use gyre_slam::{RecordReader, mapping::grid};
+use gyre_storage::LogError;
 
 use crate::maps::map;
 
@@ -110,12 +111,9 @@ impl Source {
     }
 
     /// Returns the poses of a run, without the end of the stream.
-    fn poses(
-        &self,
-    ) -> Result<impl Iterator<Item = Result<PoseHeader, JournalError>> + use<>, Failure> {
-        let records = journal::records(&journal::path(&self.path))?;
+    fn poses(&self) -> Result<impl Iterator<Item = Result<PoseHeader, LogError>> + use<>, Failure> {
+        let poses = journal::poses(&self.path)?;
         let is_end = |pose: &PoseHeader| pose.item.is(flag::END);
-        let poses = records.into_iter().flatten();
         Ok(poses.filter(move |pose| !pose.as_ref().is_ok_and(is_end)))
     }
 

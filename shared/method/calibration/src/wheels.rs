@@ -153,7 +153,8 @@ mod tests {
 
     fn speed(time_s: f64, seed: f64) -> f64 {
         let waves = (1..7).map(|k| {
-            let pace = 0.07 * f64::from(k) + 0.013 * seed;
+            // Without a common period, after which other offsets would fit as well.
+            let pace = 0.07 * f64::from(k) + 0.0031 * f64::from(k * k) + 0.013 * seed;
             (pace * time_s + seed * f64::from(k * k)).sin() / f64::from(k)
         });
         8.0 + 3.0 * waves.sum::<f64>()

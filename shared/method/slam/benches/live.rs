@@ -80,7 +80,7 @@ fn pushed(out: &Path) -> TrajectoryEstimator {
     let mut estimator = TrajectoryEstimator::new(EstimatorKind::Graph);
     let mut keyframes = RecordReader::<Keyframe>::open(out).unwrap();
     for index in 0..keyframes.len() {
-        let keyframe = keyframes.read_without_points(index).unwrap();
+        let keyframe = Keyframe::without_points(&mut keyframes, index).unwrap();
         estimator.push(&keyframe).unwrap();
     }
     estimator

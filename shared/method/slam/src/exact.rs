@@ -1,7 +1,7 @@
-//! Motions in files, bit for bit: a yaw would come back rounded, and a resumed run would not repeat
-//! the run that was not stopped.
+//! The content of records. Motions are in it bit for bit: a yaw would come back rounded, and a
+//! resumed run would not repeat the run that was not stopped.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::{AnyBitPattern, Pod, Zeroable, pod_read_unaligned};
 use gyre_geometry::{Pose, UncertainMotion, covariance};
 use nalgebra::{Translation2, UnitComplex};
 
@@ -28,4 +28,15 @@ impl From<&ExactMotion> for UncertainMotion {
             covariance: covariance::unpack(covariance),
         }
     }
+}
+
+/// Splits a record into its part of fixed length and the items behind it; `None` if it ends within
+/// one.
+pub fn split<F: AnyBitPattern, T: AnyBitPattern>(
+    bytes: &[u8],
+) -> Option<(F, impl Iterator<Item = T> + '_)> {
+    let (fixed, items) = bytes.split_at_checked(size_of::<F>())?;
+    let items = items.chunks_exact(size_of::<T>());
+    let is_whole = items.remainder().is_empty();
+    is_whole.then(|| (pod_read_unaligned(fixed), items.map(pod_read_unaligned)))
 }

@@ -1,9 +1,9 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist, UncertainMotion, covariance, pose, xy_yaw};
-use gyre_storage::{LogError, LogMagic};
+use gyre_storage::{LogError, LogMagic, Record, RecordReader};
 use nalgebra::Matrix3;
 
-use crate::{Record, RecordReader};
+use crate::exact::split;
 
 /// A scan whose pose is estimated, with all that loop closing and mapping need of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +48,15 @@ struct Fixed {
 }
 
 impl Keyframe {
+    /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
+    /// checked: the checksum covers the whole record. Panics beyond the last keyframe.
+    pub fn without_points(
+        keyframes: &mut RecordReader<Self>,
+        index: usize,
+    ) -> Result<Self, LogError> {
+        keyframes.read_start(index, size_of::<Fixed>())
+    }
+
     /// Returns the length of the form in a file of a keyframe with so many points, bytes.
     pub const fn encoded_len(points: usize) -> usize {
         size_of::<Fixed>() + points * size_of::<SparsePoint>()
@@ -81,12 +90,7 @@ impl Record for Keyframe {
     }
 
     fn decode(bytes: &[u8]) -> Option<Self> {
-        let (fixed, points) = bytes.split_at_checked(size_of::<Fixed>())?;
-        let fixed: Fixed = bytemuck::pod_read_unaligned(fixed);
-        if points.len() % size_of::<SparsePoint>() != 0 {
-            return None;
-        }
-        let points = points.chunks_exact(size_of::<SparsePoint>());
+        let (fixed, points) = split::<Fixed, SparsePoint>(bytes)?;
         let uncertain = |[x, y, yaw]: [f64; 3], packed| UncertainMotion {
             motion: pose(x, y, yaw),
             covariance: covariance::unpack(packed),
@@ -104,23 +108,16 @@ impl Record for Keyframe {
                 yaw_rate_radps: fixed.twist[2],
             },
             path_m: fixed.path_m,
-            points: points.map(bytemuck::pod_read_unaligned).collect(),
+            points: points.collect(),
         })
-    }
-}
-
-impl RecordReader<Keyframe> {
-    /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
-    /// checked: the checksum covers the whole record. Panics beyond the last keyframe.
-    pub fn read_without_points(&mut self, index: usize) -> Result<Keyframe, LogError> {
-        self.read_start(index, size_of::<Fixed>())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use gyre_storage::RecordLog;
+
     use super::*;
-    use crate::RecordLog;
 
     fn uncertain() -> UncertainMotion {
         UncertainMotion {
@@ -154,7 +151,7 @@ mod tests {
         (0..3).for_each(|_| log.append(&keyframe()).unwrap());
         let mut reader = RecordReader::<Keyframe>::open(out.path()).unwrap();
         let whole = reader.read(1).unwrap();
-        let without_points = reader.read_without_points(1).unwrap();
+        let without_points = Keyframe::without_points(&mut reader, 1).unwrap();
         assert_eq!(whole.points.len(), 3);
         assert_eq!(
             without_points,

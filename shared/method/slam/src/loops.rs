@@ -2,9 +2,9 @@ use crate::estimation::Constraint;
 pub use crate::estimation::places::VerificationOutcome as LoopOutcome;
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::UncertainMotion;
-use gyre_storage::LogMagic;
+use gyre_storage::{LogMagic, Record};
 
-use crate::{Record, exact::ExactMotion};
+use crate::exact::{ExactMotion, split};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopCandidate {
@@ -88,16 +88,11 @@ impl Record for Query {
 
     /// `None` for an invalid length, and for an unknown verdict.
     fn decode(bytes: &[u8]) -> Option<Self> {
-        let (keyframe, candidates) = bytes.split_at_checked(8)?;
-        if candidates.len() % size_of::<Fixed>() != 0 {
-            return None;
-        }
-        let candidates = candidates.chunks_exact(size_of::<Fixed>());
-        let decoded =
-            candidates.map(|bytes| bytemuck::pod_read_unaligned::<Fixed>(bytes).candidate());
+        let (keyframe, candidates) = split::<u64, Fixed>(bytes)?;
+        let candidates = candidates.map(|fixed| fixed.candidate());
         Some(Self {
-            keyframe: bytemuck::pod_read_unaligned::<u64>(keyframe) as usize,
-            candidates: decoded.collect::<Option<_>>()?,
+            keyframe: keyframe as usize,
+            candidates: candidates.collect::<Option<_>>()?,
         })
     }
 }

@@ -1,8 +1,8 @@
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::UncertainMotion;
-use gyre_storage::LogMagic;
+use gyre_storage::{LogMagic, Record};
 
-use crate::{Record, estimation::places::Descriptor, exact::ExactMotion};
+use crate::{estimation::places::Descriptor, exact::ExactMotion};
 
 /// All that later queries need of a keyframe beside its points.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,7 +8,7 @@
 //! names its keyframes by their content, and the motion that it led to:
 //! [`Checkpoint::newest_known`] finds the last pose of a journal whose state is whole.
 
-mod codec;
+mod slot;
 
 use std::{
     mem,
@@ -17,16 +17,15 @@ use std::{
 
 use gyre_contract::{MotionEstimate, PoseHeader};
 use gyre_matching::{Refiner, TrackerState};
-use gyre_storage::{DurableFile, GroupSync, Slots, StorageError};
+use gyre_storage::{DurableFile, GroupSync, LogError, Slots, StorageError};
 
-use crate::JournalError;
-use codec::{
-    EMPTY, KEYFRAME_WORDS, Name, decode_keyframe, decode_state, encode_keyframe, encode_state,
-    keyframe_name, state_bytes,
+use slot::{
+    EMPTY, Name, State, decode_keyframe, decode_state, encode_keyframe, encode_state,
+    keyframe_bytes, keyframe_name, state_bytes,
 };
 
 /// The start of the file, with the version of the slots.
-const MAGIC: [u8; 16] = *b"gyre map v9     ";
+const MAGIC: [u8; 16] = *b"gyre map v10    ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be
 /// continued with a different window.
 const MAX_WINDOW: usize = 66;
@@ -76,6 +75,14 @@ pub fn checksum(motion: &MotionEstimate) -> u64 {
     crc32fast::hash(bytemuck::bytes_of(motion)).into()
 }
 
+/// The state is not in the checkpoint, which is of another version or configuration, or damaged.
+pub fn no_state(checkpoint: &Path, item: u64) -> LogError {
+    LogError::Missing(format!(
+        "{} does not have the state of the refinement before item {item}: start again with --fresh",
+        checkpoint.display()
+    ))
+}
+
 fn slot_of(item: u64) -> u64 {
     item % STATES as u64
 }
@@ -88,7 +95,7 @@ impl Layout {
         };
         let keyframes = Slots {
             start: states.offset(STATES as u64),
-            bytes: KEYFRAME_WORDS * 8 + cells,
+            bytes: keyframe_bytes(cells),
         };
         Self {
             states,
@@ -116,7 +123,7 @@ impl Checkpoint {
         window: usize,
         max_keyframes: usize,
         cells: usize,
-    ) -> Result<Self, JournalError> {
+    ) -> Result<Self, LogError> {
         let layout = Layout::of(max_keyframes, cells);
         let file = DurableFile::open(path, |file| {
             let (header, mut found) = (layout.header(), [0; HEADER_BYTES]);
@@ -125,7 +132,7 @@ impl Checkpoint {
                 file.set_length(0)?;
                 file.write_at(&header, 0)?;
             }
-            Ok::<(), JournalError>(())
+            Ok::<(), LogError>(())
         })?;
         let mut checkpoint = Self {
             file,
@@ -153,10 +160,16 @@ impl Checkpoint {
     /// keyframes, then the state that names them. If the file has this state already, the process
     /// repeats items after a restart, and it is left: later states may still be needed. If it has
     /// another state, all later ones are obsolete.
-    pub fn write(&mut self, item: u64, motion: u64, refiner: &Refiner) -> Result<(), JournalError> {
+    pub fn write(&mut self, item: u64, motion: u64, refiner: &Refiner) -> Result<(), LogError> {
         self.name_keyframes(item, refiner);
         let (states, slot) = (self.layout.states, slot_of(item));
-        encode_state((item, motion), &self.map, refiner.state(), &mut self.state);
+        let state = State {
+            item,
+            motion,
+            tracker: *refiner.state(),
+            keyframes: &self.map[..],
+        };
+        encode_state(&state, &mut self.state);
         let is_there = self.file.read(&states, slot, &mut self.found)?;
         let known = is_there && self.found == self.state;
         if !known {
@@ -231,14 +244,18 @@ impl Checkpoint {
     fn read_state(&mut self, item: u64) -> Result<Option<(u64, TrackerState)>, StorageError> {
         let states = &self.layout.states;
         let whole = self.file.read(states, slot_of(item), &mut self.found)?;
-        let state = decode_state(&self.found, &mut self.map);
-        let state = state.filter(|((of, _), _)| whole && *of == item);
-        Ok(state.map(|((_, motion), tracker)| (motion, tracker)))
+        let state = decode_state(&self.found);
+        let state = state.filter(|state| whole && state.item == item);
+        Ok(state.map(|state| {
+            self.map.clear();
+            self.map.extend(state.keyframes);
+            (state.motion, state.tracker)
+        }))
     }
 
-    pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), JournalError> {
+    pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), LogError> {
         let path = self.file.file.path();
-        let missing = JournalError::no_state(path, item.saturating_add(1));
+        let missing = no_state(path, item.saturating_add(1));
         let Some((_, tracker)) = self.read_state(item)? else {
             return Err(missing);
         };
@@ -269,7 +286,7 @@ impl Checkpoint {
     pub fn newest_known<'a>(
         &mut self,
         poses: impl IntoIterator<Item = &'a PoseHeader>,
-    ) -> Result<Option<&'a PoseHeader>, JournalError> {
+    ) -> Result<Option<&'a PoseHeader>, LogError> {
         for pose in poses {
             let motion = checksum(&pose.motion);
             let state = self.read_state(pose.item.seq)?;

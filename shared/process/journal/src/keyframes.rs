@@ -4,10 +4,10 @@ use std::{mem, path::Path};
 
 use gyre_contract::PoseHeader;
 use gyre_geometry::SparsePoint;
-use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose, records_path};
-use gyre_storage::LogError;
+use gyre_slam::{Keyframe, KeyframeBuilder, ScanPose};
+use gyre_storage::{LogError, RecordLog, RecordReader, records_path};
 
-use crate::{JournalError, PoseLog};
+use crate::PoseLog;
 
 #[derive(Debug)]
 pub struct Keyframes {
@@ -21,7 +21,7 @@ impl Keyframes {
     /// and perhaps the end of the stream. Keyframes beyond them are cut off, and the motion since
     /// the last one is recovered from the journal.
     /// Appending allocates nothing for scans of up to `points` points.
-    pub fn open(out: &Path, poses: u64, ended: bool, points: usize) -> Result<Self, JournalError> {
+    pub fn open(out: &Path, poses: u64, ended: bool, points: usize) -> Result<Self, LogError> {
         let mut log = RecordLog::open(out)?;
         log.reserve(Keyframe::encoded_len(points));
         let (keyframes, last) = newest(log.len(), poses, |index| log.read(index))?;
@@ -37,7 +37,7 @@ impl Keyframes {
             }),
             (_, Some(pose)) => {
                 let path = records_path::<Keyframe>(out);
-                Err(JournalError::Missing(format!(
+                Err(LogError::Missing(format!(
                     "{} lacks the keyframe of pose {pose}: the same command computes it again",
                     path.display()
                 )))
@@ -48,7 +48,7 @@ impl Keyframes {
 
 impl PoseLog for Keyframes {
     /// Appends the pose if it becomes a keyframe.
-    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError> {
+    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, LogError> {
         let Some(mut keyframe) = self.builder.next(&scan_pose(pose)) else {
             self.log.rely()?;
             return Ok(false);
@@ -61,18 +61,18 @@ impl PoseLog for Keyframes {
         Ok(true)
     }
 
-    fn end(&mut self) -> Result<(), JournalError> {
-        Ok(self.log.end()?)
+    fn end(&mut self) -> Result<(), LogError> {
+        self.log.end()
     }
 
-    fn sync(&self) -> Result<(), JournalError> {
-        Ok(self.log.sync()?)
+    fn sync(&self) -> Result<(), LogError> {
+        self.log.sync()
     }
 }
 
 /// Returns how many of the first `poses` poses of the journal have all their keyframes. After a
 /// death all of them have; a power failure can take the last keyframes. Changes nothing.
-pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, JournalError> {
+pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, LogError> {
     let mut reader = RecordReader::open(out)?;
     let (_, last) = newest(reader.len(), poses, |index| reader.read(index))?;
     let (_, missing) = recover(out, last.as_ref(), poses)?;
@@ -101,13 +101,13 @@ fn recover(
     out: &Path,
     newest: Option<&Keyframe>,
     poses: u64,
-) -> Result<(KeyframeBuilder, Option<u64>), JournalError> {
+) -> Result<(KeyframeBuilder, Option<u64>), LogError> {
     let mut builder = KeyframeBuilder::default();
     let last = newest.map_or(0, |keyframe| keyframe.seq);
-    let records = crate::records_from(&crate::path(out), last)?;
+    let records = crate::poses_from(out, last)?;
     // Behind them may be the leftovers of others after a power failure, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
-    for pose in records.into_iter().flatten().take(count) {
+    for pose in records.take(count) {
         let pose = pose?;
         let seq = pose.item.seq;
         match newest {

@@ -2,101 +2,106 @@
 //! SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the
 //! [`checkpoint`] of its refinement.
 //!
-//! The journal has each pose with its motion and a checksum, written before the pose is published;
-//! all results of a run are made from it. [`check`] finds what a death or a power failure has left
-//! of the last records; those poses are computed again.
+//! The journal has each pose with its motion, written before the pose is published; all results of
+//! a run are made from it. [`check`] finds what a death or a power failure has left of the last
+//! poses; those that are lost are computed again.
 
-mod check;
 pub mod checkpoint;
-mod error;
 pub mod keyframes;
 pub mod loops;
 pub mod objects;
-mod record;
-mod records;
 pub mod scans;
 #[cfg(test)]
 mod tests;
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::VecDeque,
+    path::{Path, PathBuf},
+};
 
 use gyre_contract::{PoseHeader, flag};
 use gyre_geometry::SparsePoint;
-use gyre_storage::DurableFile;
+use gyre_storage::{GroupSync, LogError, LogMagic, Record, RecordLog, RecordReader, records_path};
 
-pub use check::{Content, check, cut};
-pub use error::JournalError;
 pub use gyre_storage::continue_when_full;
-use record::{MAGIC, RECORD, RECORDS, Record};
-pub use records::{Records, records, records_from};
+
+/// Number of the last poses that a check returns: more than a power failure can take.
+const LAST: usize = 8 * GroupSync::LIMIT as usize;
+
+/// A record of the journal. The end of the stream is one too, since its item counts the scans.
+#[derive(Debug)]
+struct LoggedPose(PoseHeader);
+
+impl Record for LoggedPose {
+    const FILE: &'static str = "poses.journal";
+    const MAGIC: LogMagic = *b"gyre journal v13";
+    const LENGTH: Option<usize> = Some(size_of::<PoseHeader>());
+
+    fn encode(&self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(bytemuck::bytes_of(&self.0));
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        bytemuck::try_pod_read_unaligned(bytes).ok().map(Self)
+    }
+}
 
 #[derive(Debug)]
-pub struct Journal {
-    file: DurableFile,
-    /// Number of records, and of those that were there when it was opened.
-    records: u64,
-    found: u64,
-    buffer: [u8; RECORD],
-}
+pub struct Journal(RecordLog<LoggedPose>);
 
 /// A log of poses with the points of their scans, each appended before its pose is journalled.
 pub trait PoseLog {
     /// Takes the next pose, before it is journalled. Returns whether it was appended.
-    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError>;
+    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, LogError>;
 
     /// Marks the end of the stream, before the journal does. All records survive a power failure
     /// when this returns.
-    fn end(&mut self) -> Result<(), JournalError>;
+    fn end(&mut self) -> Result<(), LogError>;
 
     /// Waits until all records so far survive a power failure.
-    fn sync(&self) -> Result<(), JournalError>;
+    fn sync(&self) -> Result<(), LogError>;
 }
 
 pub fn path(out: &Path) -> PathBuf {
-    out.join("journal").join("poses.journal")
+    records_path::<LoggedPose>(out)
+}
+
+/// Reads the poses of a run, oldest first, and the end of the stream; none without a journal.
+pub fn poses(
+    out: &Path,
+) -> Result<impl Iterator<Item = Result<PoseHeader, LogError>> + use<>, LogError> {
+    poses_from(out, 0)
+}
+
+/// As [`poses`], from the pose number `first` on.
+pub fn poses_from(
+    out: &Path,
+    first: u64,
+) -> Result<impl Iterator<Item = Result<PoseHeader, LogError>> + use<>, LogError> {
+    let first = usize::try_from(first).unwrap_or(usize::MAX);
+    let records = RecordReader::<LoggedPose>::open(out)?.from(first);
+    Ok(records.map(|record| record.map(|LoggedPose(pose)| pose)))
 }
 
 impl Journal {
-    /// Opens or creates a journal and cuts off an incomplete record at its end. Only the end is
-    /// read, however long it is.
-    pub fn open(path: &Path) -> Result<Self, JournalError> {
-        let mut records = 0;
-        let file = DurableFile::open(path, |file| {
-            let begin = RECORDS.start;
-            records = file.length()?.saturating_sub(begin) / RECORD as u64;
-            let mut header = [0; MAGIC.len()];
-            if records > 0 && !(file.read_at(&mut header, 0)? && header == MAGIC) {
-                return Err(records::refused(&header, path));
-            }
-            if records == 0 {
-                // Opened to be read, it is refused if it belongs to another program.
-                records::records(path)?;
-                file.write_at(&MAGIC, 0)?;
-            }
-            Ok(file.cut_to(RECORDS.offset(records))?)
-        })?;
-        Ok(Self {
-            file,
-            records,
-            found: records,
-            buffer: [0; RECORD],
-        })
+    /// Opens or creates the journal of the run that writes to `out`, and cuts off what a death or a
+    /// power failure has left of its last records. Only the end is read, however long it is.
+    pub fn open(out: &Path) -> Result<Self, LogError> {
+        let mut log = RecordLog::open(out)?;
+        log.reserve(size_of::<PoseHeader>());
+        Ok(Self(log))
     }
 
     /// Returns the last poses, at most `count`, oldest first, and whether the end of the stream
     /// follows them.
-    pub fn last(&self, count: usize) -> Result<(Vec<PoseHeader>, bool), JournalError> {
+    pub fn last(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), LogError> {
         let mut poses = Vec::with_capacity(count);
         let mut ended = false;
-        let mut bytes = [0; RECORD];
-        for index in (0..self.records).rev() {
+        for index in (0..self.0.len()).rev() {
             if poses.len() == count {
                 break;
             }
-            let whole = self.file.read(&RECORDS, index, &mut bytes)?;
-            let record = Record::decode(&bytes, index).filter(|_| whole);
-            let damaged = || JournalError::damaged(self.file.file.path(), index);
-            let pose = record.ok_or_else(damaged)?.pose;
+            let LoggedPose(pose) = self.0.read(index)?;
             match pose.item.is(flag::END) {
                 true => ended = true,
                 false => poses.push(pose),
@@ -107,26 +112,53 @@ impl Journal {
     }
 
     /// Appends a pose, or the end of the stream.
-    pub fn append(&mut self, pose: &PoseHeader) -> Result<(), JournalError> {
-        let safe = self
-            .file
-            .sync
-            .safe()
-            .map_or(0, |appended| self.found + appended);
-        let record = Record {
-            pose: *pose,
-            in_danger: u32::try_from(self.records - safe).unwrap_or(u32::MAX),
-        };
-        record.encode(&mut self.buffer);
-        self.file.write(&RECORDS, self.records, &self.buffer)?;
-        self.file.file.require_name()?;
-        self.records += 1;
-        Ok(self.file.sync.changed()?)
+    pub fn append(&mut self, pose: &PoseHeader) -> Result<(), LogError> {
+        self.0.append(&LoggedPose(*pose))
     }
 
     /// Waits until all that was appended survives a power failure.
-    pub fn sync(&self) -> Result<(), JournalError> {
-        self.file.file.require_name()?;
-        Ok(self.file.sync.finish()?)
+    pub fn sync(&self) -> Result<(), LogError> {
+        self.0.sync()
     }
+}
+
+#[derive(Clone, Debug, Default)]
+pub struct Content {
+    pub poses: u64,
+    /// True if the end of the stream follows them.
+    pub ended: bool,
+    /// Records behind them that are not whole, or that follow the end: to be cut off by [`cut`].
+    pub torn: u64,
+    /// The last poses, oldest first; not all of them in a long journal.
+    pub last: VecDeque<PoseHeader>,
+}
+
+/// Reads a whole journal, in bounded memory, and finds out what of it is valid. Changes nothing.
+pub fn check(out: &Path) -> Result<Content, LogError> {
+    let mut reader = RecordReader::<LoggedPose>::open(out)?;
+    let mut content = Content::default();
+    for index in 0..reader.len() {
+        let LoggedPose(pose) = reader.read(index)?;
+        if content.ended {
+            content.torn += 1;
+            continue;
+        }
+        content.ended = pose.item.is(flag::END);
+        if !content.ended {
+            content.poses += 1;
+            if content.last.len() == LAST {
+                content.last.pop_front();
+            }
+            content.last.push_back(pose);
+        }
+    }
+    content.torn += reader.torn() as u64;
+    Ok(content)
+}
+
+/// Cuts a journal after `records` records. The cut survives a power failure. Waits up to a second
+/// for a stage of a killed run that still writes it: that dies a moment after its supervisor.
+pub fn cut(out: &Path, records: u64) -> Result<(), LogError> {
+    let mut log = RecordLog::<LoggedPose>::open(out)?;
+    log.cut(usize::try_from(records).unwrap_or(usize::MAX))
 }

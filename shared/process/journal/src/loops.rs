@@ -5,8 +5,8 @@ use std::path::Path;
 
 use gyre_contract::{Item, LoopHeader};
 use gyre_geometry::{covariance, xy_yaw};
-use gyre_slam::{Keyframe, LoopCandidate, Query, RecordReader};
-use gyre_storage::LogError;
+use gyre_slam::{Keyframe, LoopCandidate, Query};
+use gyre_storage::{LogError, RecordReader};
 
 pub struct LoggedLoops {
     keyframes: RecordReader<Keyframe>,
@@ -53,7 +53,7 @@ pub fn loops_of(
     let mut found = Vec::new();
     for (number, (candidate, _)) in (first..).zip(query.loops()) {
         let ends = [query.keyframe, candidate.place];
-        let [later, earlier] = ends.map(|index| keyframes.read_without_points(index));
+        let [later, earlier] = ends.map(|index| Keyframe::without_points(keyframes, index));
         found.push(loop_header(number, &later?, &earlier?, candidate));
     }
     Ok(found)

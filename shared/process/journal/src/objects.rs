@@ -4,11 +4,9 @@ use bytemuck::{Pod, Zeroable};
 use gyre_contract::ListedObject;
 use gyre_geometry::wrap_angle;
 use gyre_objects::Object;
-use gyre_slam::Record;
-use gyre_storage::LogMagic;
+use gyre_slam::split;
+use gyre_storage::{LogMagic, Record};
 use nalgebra::{Matrix2, Point2, Vector2};
-
-use crate::record::split;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedObjects {

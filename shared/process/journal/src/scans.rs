@@ -6,10 +6,10 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 use gyre_contract::PoseHeader;
 use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
-use gyre_slam::{Record, RecordLog, RecordReader, records_path};
-use gyre_storage::{LogError, LogMagic};
+use gyre_slam::split;
+use gyre_storage::{LogError, LogMagic, Record, RecordLog, RecordReader, records_path};
 
-use crate::{JournalError, PoseLog, record::split};
+use crate::PoseLog;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedScan {
@@ -100,13 +100,13 @@ impl Scans {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Scans beyond them are cut off.
     /// Appending allocates nothing for scans of up to `points` points.
-    pub fn open(out: &Path, poses: u64, ended: bool, points: usize) -> Result<Self, JournalError> {
+    pub fn open(out: &Path, poses: u64, ended: bool, points: usize) -> Result<Self, LogError> {
         let mut log = RecordLog::open(out)?;
         log.reserve(size_of::<Fixed>() + points * size_of::<SparsePoint>());
         let scans = log.len() as u64;
         if scans < poses {
             let path = records_path::<LoggedScan>(out);
-            return Err(JournalError::Missing(format!(
+            return Err(LogError::Missing(format!(
                 "{} has {scans} scans of {poses} poses: the same command computes them again",
                 path.display()
             )));
@@ -123,7 +123,7 @@ impl Scans {
 }
 
 impl PoseLog for Scans {
-    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, JournalError> {
+    fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, LogError> {
         let mut memory = std::mem::take(&mut self.points);
         memory.clear();
         memory.extend_from_slice(points);
@@ -134,12 +134,12 @@ impl PoseLog for Scans {
         Ok(true)
     }
 
-    fn end(&mut self) -> Result<(), JournalError> {
-        Ok(self.log.end()?)
+    fn end(&mut self) -> Result<(), LogError> {
+        self.log.end()
     }
 
-    fn sync(&self) -> Result<(), JournalError> {
-        Ok(self.log.sync()?)
+    fn sync(&self) -> Result<(), LogError> {
+        self.log.sync()
     }
 }
 

@@ -106,8 +106,10 @@ impl From<LogError> for RunError {
     /// read.
     fn from(error: LogError) -> Self {
         match error {
-            LogError::Foreign { .. } | LogError::Malformed { .. } => Self::Input(error.to_string()),
-            _ => Self::Transient(format!("cannot use a log of the run: {error}")),
+            LogError::Storage(_) | LogError::Damaged { .. } | LogError::Busy(_) => {
+                Self::Transient(format!("cannot use a log of the run: {error}"))
+            }
+            _ => Self::Input(error.to_string()),
         }
     }
 }

@@ -131,9 +131,8 @@ impl<'a, 'b> Pass<'a, 'b> {
 
     /// Reads the journal of a run to its end.
     pub fn over(mut self, out: &Path) -> Result<Read, Failure> {
-        let records = journal::records(&journal::path(out))?;
-        for record in records.into_iter().flatten() {
-            self.add(&record?)?;
+        for pose in journal::poses(out)? {
+            self.add(&pose?)?;
         }
         self.files.push(self.odometry);
         self.files.push(self.tum);

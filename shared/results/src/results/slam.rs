@@ -40,8 +40,7 @@ pub struct Slam {
 
 /// Checks that a run without keyframes has no poses either: the first one has a keyframe.
 fn require_no_poses(out: &Out) -> Result<(), Failure> {
-    let mut records = journal::records(&journal::path(out.path()))?;
-    let first = records.as_mut().and_then(Iterator::next).transpose()?;
+    let first = journal::poses(out.path())?.next().transpose()?;
     match first.is_some_and(|pose| !pose.item.is(flag::END)) {
         false => Ok(()),
         true => Err(format!(

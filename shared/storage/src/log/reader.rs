@@ -7,8 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{LogError, LogMagic, MAX_BYTES};
-use crate::{GroupSync, StorageError, may_begin};
+use super::{LogError, LogKind, LogMagic, MAX_BYTES, OURS};
+use crate::{GroupSync, StorageError, durable::may_begin};
 
 const HEADER: usize = 20;
 /// A record begins at a multiple of so many bytes.
@@ -26,7 +26,8 @@ const LONGEST_END: u64 = (IN_DANGER * (MAX_BYTES + MARGIN)) as u64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    index: u64,
+    index: u32,
+    danger: u32,
     length: u32,
     check: u32,
 }
@@ -34,9 +35,10 @@ pub struct Header {
 impl Header {
     fn encode(&self) -> [u8; HEADER] {
         let mut bytes = [0; HEADER];
-        bytes[..8].copy_from_slice(&self.index.to_le_bytes());
-        bytes[8..12].copy_from_slice(&self.length.to_le_bytes());
-        bytes[12..16].copy_from_slice(&self.check.to_le_bytes());
+        let words = [self.index, self.danger, self.length, self.check];
+        for (bytes, word) in bytes.chunks_exact_mut(4).zip(words) {
+            bytes.copy_from_slice(&word.to_le_bytes());
+        }
         let check = crc32fast::hash(&bytes[..16]);
         bytes[16..].copy_from_slice(&check.to_le_bytes());
         bytes
@@ -46,23 +48,39 @@ impl Header {
     fn decode(bytes: &[u8]) -> Option<Self> {
         let (content, check) = bytes.get(..HEADER)?.split_at(16);
         let valid = crc32fast::hash(content).to_le_bytes() == check;
+        let mut words = content.as_chunks::<4>().0.iter();
+        let mut next = || words.next().map(|word| u32::from_le_bytes(*word));
         let header = Self {
-            index: u64::from_le_bytes(*content.first_chunk()?),
-            length: u32::from_le_bytes(*content[8..].first_chunk()?),
-            check: u32::from_le_bytes(*content[12..].first_chunk()?),
+            index: next()?,
+            danger: next()?,
+            length: next()?,
+            check: next()?,
         };
         (valid && header.length as usize <= MAX_BYTES).then_some(header)
     }
 
     fn record(&self) -> u64 {
-        (HEADER + (self.length as usize).next_multiple_of(ALIGNMENT)) as u64
+        bytes_in_file(self.length as usize)
+    }
+
+    /// The number of the first record that may have been in danger when this one was written.
+    fn first_in_danger(&self) -> usize {
+        let in_danger = self.danger.checked_sub(1);
+        let in_danger = in_danger.map_or(IN_DANGER - 1, |count| count as usize);
+        (self.index as usize).saturating_sub(in_danger)
     }
 }
 
+/// Returns the bytes in a file of a record of so many bytes.
+const fn bytes_in_file(length: usize) -> u64 {
+    (HEADER + length.next_multiple_of(ALIGNMENT)) as u64
+}
+
 /// Encodes the record number `index`, in place of the content of `bytes`.
-pub(super) fn encode(index: usize, record: &[u8], bytes: &mut Vec<u8>) -> Header {
+pub(super) fn encode(index: usize, danger: u32, record: &[u8], bytes: &mut Vec<u8>) -> Header {
     let header = Header {
-        index: index as u64,
+        index: index as u32,
+        danger,
         length: record.len() as u32,
         check: crc32fast::hash(record),
     };
@@ -73,7 +91,8 @@ pub(super) fn encode(index: usize, record: &[u8], bytes: &mut Vec<u8>) -> Header
     header
 }
 
-/// Reads a log while another process may append to it. It needs 16 bytes of memory for each record.
+/// Reads a log while another process may append to it. It needs 24 bytes of memory for each record,
+/// and none if all have the same length.
 #[derive(Debug)]
 pub struct LogReader {
     path: PathBuf,
@@ -82,53 +101,89 @@ pub struct LogReader {
     file: Option<File>,
     /// True if the file has its whole magic.
     pub(super) has_magic: bool,
-    places: Vec<Place>,
+    places: Places,
     unchanged: usize,
+    /// The last record that was found whole, with its number.
+    newest: Option<(usize, Header)>,
+    /// Bytes behind the complete records.
+    behind: u64,
+}
+
+#[derive(Debug)]
+enum Places {
+    Listed(Vec<Place>),
+    /// Records of one length, and how many there are.
+    Equal {
+        length: usize,
+        count: usize,
+    },
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Place {
+    header: Header,
     end: u64,
-    length: u32,
-    check: u32,
 }
 
 impl LogReader {
     /// Opens a log and finds its complete records. One that does not exist yet is empty.
-    pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
-        let mut reader = Self::new(path, magic);
+    pub fn open(path: &Path, kind: LogKind) -> Result<Self, LogError> {
+        let mut reader = Self::new(path, kind);
         reader.refresh()?;
         Ok(reader)
     }
 
     /// The reader of a log that has not been looked at.
-    pub(super) fn new(path: &Path, magic: LogMagic) -> Self {
+    pub(super) fn new(path: &Path, kind: LogKind) -> Self {
+        let places = match kind.length {
+            None => Places::Listed(Vec::new()),
+            Some(length) => Places::Equal { length, count: 0 },
+        };
         Self {
             path: path.to_owned(),
-            magic,
+            magic: kind.magic,
             file: None,
             has_magic: false,
-            places: Vec::new(),
+            places,
             unchanged: 0,
+            newest: None,
+            behind: 0,
         }
     }
 
     /// Returns the number of complete records at the last [`refresh`](Self::refresh).
     pub fn len(&self) -> usize {
-        self.places.len()
+        match &self.places {
+            Places::Listed(places) => places.len(),
+            Places::Equal { count, .. } => *count,
+        }
     }
 
     pub fn is_empty(&self) -> bool {
-        self.places.is_empty()
+        self.len() == 0
+    }
+
+    /// Returns the number of records behind the complete ones, if all have one length.
+    pub fn torn(&self) -> usize {
+        match &self.places {
+            Places::Listed(_) => 0,
+            Places::Equal { length, .. } => (self.behind / bytes_in_file(*length)) as usize,
+        }
+    }
+
+    pub(super) fn has_one_length(&self) -> bool {
+        matches!(self.places, Places::Equal { .. })
     }
 
     pub(super) fn reserve(&mut self, records: usize) {
-        self.places.reserve(records);
+        if let Places::Listed(places) = &mut self.places {
+            places.reserve(records);
+        }
     }
 
     /// Returns how many of the first records were known before the last [`refresh`](Self::refresh),
     /// and are the same. Fewer than were known if the process that appends was restarted and has
-    /// cut some off; it may have appended others since.
+    /// cut some off; it may have appended others since. None then if all have the same length.
     pub fn unchanged(&self) -> usize {
         self.unchanged
     }
@@ -139,44 +194,55 @@ impl LogReader {
 
     /// Returns the offset of a record, or of the next one.
     fn start(&self, index: usize) -> u64 {
-        match index {
-            0 => size_of::<LogMagic>() as u64,
-            _ => self.places[index - 1].end,
+        let first = size_of::<LogMagic>() as u64;
+        match &self.places {
+            Places::Equal { length, .. } => first + index as u64 * bytes_in_file(*length),
+            Places::Listed(places) => match index.checked_sub(1) {
+                None => first,
+                Some(before) => places[before].end,
+            },
+        }
+    }
+
+    /// Returns the bytes of a record; panics beyond the last one.
+    fn length_of(&self, index: usize) -> usize {
+        match &self.places {
+            Places::Listed(places) => places[index].header.length as usize,
+            Places::Equal { length, count } => {
+                assert!(index < *count, "record {index} of {count}");
+                *length
+            }
         }
     }
 
     pub(super) fn push(&mut self, header: Header) {
-        self.places.push(Place {
-            end: self.end() + header.record(),
-            length: header.length,
-            check: header.check,
-        });
+        let end = self.end() + header.record();
+        match &mut self.places {
+            Places::Listed(places) => places.push(Place { header, end }),
+            Places::Equal { count, .. } => *count += 1,
+        }
     }
 
     pub(super) fn truncate(&mut self, records: usize) {
-        self.places.truncate(records);
+        match &mut self.places {
+            Places::Listed(places) => places.truncate(records),
+            Places::Equal { count, .. } => *count = records.min(*count),
+        }
     }
 
     /// Looks for records that were appended or cut off meanwhile; returns the number of complete
-    /// ones now. Only the headers of the new ones are read, and the bytes of those that may be
-    /// damaged.
+    /// ones now. Only the headers of the new ones are read, or nothing if all have the same length,
+    /// and the bytes of those that may be damaged.
     pub fn refresh(&mut self) -> Result<usize, LogError> {
         let Some(length) = self.open_file()? else {
             return Ok(self.len());
         };
-        while !self.is_last_unchanged(length)? {
-            self.places.pop();
-        }
+        self.keep_unchanged(length)?;
         self.unchanged = self.len();
-        while self.has_magic
-            && let Some(header) = self.header_at(self.end())?
-            && header.index == self.len() as u64
-            && self.end() + header.record() <= length
-        {
-            self.push(header);
-        }
+        self.find_new(length)?;
         self.drop_incomplete()?;
-        if self.end() < length {
+        self.behind = length.saturating_sub(self.end());
+        if self.behind > 0 {
             self.require_no_safe_record_after_end(length)?;
         }
         Ok(self.len())
@@ -197,38 +263,69 @@ impl LogReader {
             self.has_magic = found == self.magic;
             if !may_begin(&found[..bytes], &self.magic) {
                 let path = self.path.clone();
-                return Err(LogError::Foreign { path });
+                return Err(match found.starts_with(OURS) {
+                    true => LogError::OtherVersion { path },
+                    false => LogError::Foreign { path },
+                });
             }
         }
         Ok(Some(length))
     }
 
-    /// Returns whether the last known record is still in the file of this length. The appending
-    /// process may have cut it off and appended a different one.
-    fn is_last_unchanged(&self, length: u64) -> Result<bool, StorageError> {
-        let (Some(last), Some(place)) = (self.len().checked_sub(1), self.places.last()) else {
-            return Ok(true);
-        };
-        let known = Header {
-            index: last as u64,
-            length: place.length,
-            check: place.check,
-        };
-        Ok(place.end <= length && self.header_at(self.start(last))? == Some(known))
+    /// Forgets known records that are not in the file of this length any more. The appending
+    /// process may have cut them off and appended different ones.
+    fn keep_unchanged(&mut self, length: u64) -> Result<(), StorageError> {
+        while let Some(last) = self.len().checked_sub(1) {
+            let (known, before) = match &self.places {
+                Places::Listed(places) => (places.last().map(|place| place.header), last),
+                Places::Equal { .. } => {
+                    let newest = self.newest.filter(|(index, _)| *index == last);
+                    (newest.map(|(_, header)| header), 0)
+                }
+            };
+            if self.end() <= length && self.header_at(self.start(last))? == known {
+                break;
+            }
+            self.truncate(before);
+        }
+        Ok(())
+    }
+
+    fn find_new(&mut self, length: u64) -> Result<(), StorageError> {
+        if !self.has_magic {
+            return Ok(());
+        }
+        let first = self.start(0);
+        if let Places::Equal {
+            length: each,
+            count,
+        } = &mut self.places
+        {
+            let found = length.saturating_sub(first) / bytes_in_file(*each);
+            *count = (*count).max(found as usize);
+            return Ok(());
+        }
+        while let Some(header) = self.header_at(self.end())?
+            && header.index as usize == self.len()
+            && self.end() + header.record() <= length
+        {
+            self.push(header);
+        }
+        Ok(())
     }
 
     /// Drops the first damaged one of the last records, and those behind it. Those that were known
-    /// before were whole.
+    /// before were whole, and so must the record be before all that can be damaged.
     fn drop_incomplete(&mut self) -> Result<(), LogError> {
         let mut bytes = Vec::new();
         let first = self.len().saturating_sub(IN_DANGER);
-        for index in first.max(self.unchanged)..self.len() {
+        for index in first.saturating_sub(1).max(self.unchanged)..self.len() {
             match self.read(index, &mut bytes) {
-                Err(LogError::Damaged { .. }) => {
+                Err(LogError::Damaged { .. }) if index >= first => {
                     self.truncate(index);
                     break;
                 }
-                read => read?,
+                read => self.newest = Some((index, read?)),
             }
         }
         Ok(())
@@ -249,7 +346,7 @@ impl LogReader {
             let last_start = found.saturating_sub(HEADER);
             for start in (0..=last_start).step_by(ALIGNMENT) {
                 let header = Header::decode(&bytes[start..found]);
-                if header.is_some_and(|it| it.index >= (self.len() + IN_DANGER) as u64) {
+                if header.is_some_and(|it| it.first_in_danger() > self.len()) {
                     return Err(self.damaged(self.len()));
                 }
             }
@@ -259,11 +356,10 @@ impl LogReader {
         Ok(())
     }
 
-    pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<(), LogError> {
+    pub fn read(&self, index: usize, bytes: &mut Vec<u8>) -> Result<Header, LogError> {
         let header = self.read_start(index, usize::MAX, bytes)?;
-        bytes.truncate(header.length as usize);
         match crc32fast::hash(bytes) == header.check {
-            true => Ok(()),
+            true => Ok(header),
             false => Err(self.damaged(index)),
         }
     }
@@ -276,10 +372,12 @@ impl LogReader {
         length: usize,
         bytes: &mut Vec<u8>,
     ) -> Result<Header, LogError> {
-        let length = length.min(self.places[index].length as usize);
-        bytes.resize(HEADER + length, 0);
+        let of_record = self.length_of(index);
+        bytes.resize(HEADER + length.min(of_record), 0);
         let whole = self.read_some(bytes, self.start(index))? == bytes.len();
-        let header = Header::decode(bytes).filter(|header| whole && header.index == index as u64);
+        let is_right =
+            |header: &Header| (header.index as usize, header.length as usize) == (index, of_record);
+        let header = Header::decode(bytes).filter(|header| whole && is_right(header));
         bytes.drain(..HEADER);
         header.ok_or_else(|| self.damaged(index))
     }

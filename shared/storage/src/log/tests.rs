@@ -4,6 +4,16 @@ use super::*;
 use crate::GroupSync;
 
 const MAGIC: LogMagic = *b"a test's log v1\n";
+const KIND: LogKind = LogKind {
+    magic: MAGIC,
+    length: None,
+};
+/// Records of one length.
+const EQUAL: LogKind = LogKind {
+    magic: *b"gyre equal 1   \n",
+    length: Some(EACH),
+};
+const EACH: usize = 30;
 const LIMIT: usize = GroupSync::LIMIT as usize;
 
 /// A record whose length depends on its number.
@@ -15,13 +25,13 @@ fn record(index: usize) -> Vec<u8> {
 fn log_of(records: usize) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("test.log");
-    let mut log = Log::open(&path, MAGIC).unwrap();
+    let mut log = Log::open(&path, KIND).unwrap();
     (0..records).for_each(|index| log.append(&record(index)).unwrap());
     (folder, path)
 }
 
 fn require_records(path: &Path, expected: usize) {
-    let reader = LogReader::open(path, MAGIC).unwrap();
+    let reader = LogReader::open(path, KIND).unwrap();
     assert_eq!(reader.len(), expected);
     let mut bytes = Vec::new();
     for index in 0..expected {
@@ -51,7 +61,7 @@ fn an_incomplete_record_at_the_end_is_not_seen_and_cut_off_whatever_its_length()
         fs::write(&path, &complete[..length]).unwrap();
         let expected = (0..4).filter(|k| offset(k + 1) <= length).count();
         require_records(&path, expected);
-        let mut log = Log::open(&path, MAGIC).unwrap();
+        let mut log = Log::open(&path, KIND).unwrap();
         assert_eq!(log.len(), expected, "{length} bytes");
         (expected..4).for_each(|index| log.append(&record(index)).unwrap());
         assert_eq!(fs::read(&path).unwrap(), complete, "{length} bytes");
@@ -68,7 +78,7 @@ fn what_a_power_failure_leaves_of_the_last_records_is_cut_off() {
             fs::write(&path, &complete).unwrap();
             corrupt(&path, damaged, byte);
             require_records(&path, damaged);
-            assert_eq!(Log::open(&path, MAGIC).unwrap().len(), damaged);
+            assert_eq!(Log::open(&path, KIND).unwrap().len(), damaged);
             assert_eq!(fs::read(&path).unwrap(), complete[..offset(damaged)]);
         }
     }
@@ -86,7 +96,7 @@ fn zeros_in_place_of_the_start_are_cut_off_if_they_can_be_of_a_power_failure() {
         let mut bytes = fs::read(&path).unwrap();
         bytes[..zeros].fill(0);
         fs::write(&path, bytes).unwrap();
-        match (Log::open(&path, MAGIC), expected) {
+        match (Log::open(&path, KIND), expected) {
             (Ok(log), None) => assert!(log.is_empty()),
             (Err(LogError::Damaged { record, .. }), Some(expected)) => assert_eq!(record, expected),
             other => panic!("{other:?}"),
@@ -103,8 +113,8 @@ fn a_damaged_record_in_the_middle_is_refused_with_its_number() {
         corrupt(&path, damaged, 3);
         let corrupted = fs::read(&path).unwrap();
         let errors = [
-            Log::open(&path, MAGIC).unwrap_err(),
-            LogReader::open(&path, MAGIC).unwrap_err(),
+            Log::open(&path, KIND).unwrap_err(),
+            LogReader::open(&path, KIND).unwrap_err(),
         ];
         for error in errors {
             assert!(
@@ -117,7 +127,7 @@ fn a_damaged_record_in_the_middle_is_refused_with_its_number() {
     }
     // Its bytes: found when it is read.
     corrupt(&path, 7, 21);
-    let reader = LogReader::open(&path, MAGIC).unwrap();
+    let reader = LogReader::open(&path, KIND).unwrap();
     let error = reader.read(7, &mut Vec::new()).unwrap_err();
     assert!(error.to_string().contains("damaged at record 7"), "{error}");
     reader.read(8, &mut Vec::new()).unwrap();
@@ -126,7 +136,7 @@ fn a_damaged_record_in_the_middle_is_refused_with_its_number() {
 #[test]
 fn the_start_of_a_record_is_read_as_it_was_written() {
     let (_folder, path) = log_of(50);
-    let reader = LogReader::open(&path, MAGIC).unwrap();
+    let reader = LogReader::open(&path, KIND).unwrap();
     let mut bytes = Vec::new();
     for (index, length) in [(0, 8), (7, 0), (7, 5), (7, 7), (39, 12), (39, 1000)] {
         reader.read_start(index, length, &mut bytes).unwrap();
@@ -141,11 +151,11 @@ fn the_start_of_a_record_is_read_as_it_was_written() {
 fn a_reader_sees_records_while_they_are_appended_and_cut_off() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("test.log");
-    let mut reader = LogReader::open(&path, MAGIC).unwrap();
+    let mut reader = LogReader::open(&path, KIND).unwrap();
     assert_eq!(reader.refresh().unwrap(), 0);
     let of_writer = path.clone();
     let writer = thread::spawn(move || {
-        let mut log = Log::open(&of_writer, MAGIC).unwrap();
+        let mut log = Log::open(&of_writer, KIND).unwrap();
         (0..2000).for_each(|index| log.append(&record(index)).unwrap());
         log
     });
@@ -178,17 +188,21 @@ fn a_reader_sees_records_while_they_are_appended_and_cut_off() {
 #[test]
 fn another_programs_file_is_refused_and_left_as_it_is() {
     let (_folder, path) = log_of(2);
-    let other = Log::open(&path, *b"a test's log v2\n");
+    let other = LogKind {
+        magic: *b"a test's log v2\n",
+        length: None,
+    };
+    let other = Log::open(&path, other);
     assert!(matches!(other, Err(LogError::Foreign { .. })));
     require_records(&path, 2);
     for theirs in [&b"something else altogether"[..], b"theirs"] {
         fs::write(&path, theirs).unwrap();
         assert!(matches!(
-            Log::open(&path, MAGIC),
+            Log::open(&path, KIND),
             Err(LogError::Foreign { .. })
         ));
         assert!(matches!(
-            LogReader::open(&path, MAGIC),
+            LogReader::open(&path, KIND),
             Err(LogError::Foreign { .. })
         ));
         assert_eq!(fs::read(&path).unwrap(), theirs);
@@ -198,7 +212,7 @@ fn another_programs_file_is_refused_and_left_as_it_is() {
 #[test]
 fn changes_that_rely_on_a_record_are_as_few_as_the_records_in_danger() {
     let (_folder, path) = log_of(0);
-    let mut log = Log::open(&path, MAGIC).unwrap();
+    let mut log = Log::open(&path, KIND).unwrap();
     log.append(&record(1)).unwrap();
     for _ in 0..10 * LIMIT {
         log.rely().unwrap();
@@ -223,7 +237,7 @@ fn a_record_of_an_impossible_length_is_not_read() {
     let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
     // As long as the record states, and longer than a power failure can leave.
     file.set_len(1 << 33).unwrap();
-    let error = LogReader::open(&path, MAGIC).unwrap_err();
+    let error = LogReader::open(&path, KIND).unwrap_err();
     assert!(
         matches!(error, LogError::Damaged { record: 3, .. }),
         "{error}"
@@ -233,8 +247,151 @@ fn a_record_of_an_impossible_length_is_not_read() {
 #[test]
 fn a_record_that_no_reader_would_take_is_not_appended() {
     let (_folder, path) = log_of(1);
-    let mut log = Log::open(&path, MAGIC).unwrap();
+    let mut log = Log::open(&path, KIND).unwrap();
     assert!(log.append(&vec![0; MAX_BYTES + 1]).is_err());
     log.append(&[0; 5]).unwrap();
-    assert_eq!(LogReader::open(&path, MAGIC).unwrap().len(), 2);
+    assert_eq!(LogReader::open(&path, KIND).unwrap().len(), 2);
+}
+
+/// A log of so many records of one length, and its folder.
+fn equal_log_of(records: usize) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("equal.log");
+    let mut log = Log::open(&path, EQUAL).unwrap();
+    (0..records).for_each(|index| log.append(&[index as u8; EACH]).unwrap());
+    (folder, path)
+}
+
+/// The same, of records that were in danger when later ones were written: the power has failed
+/// early.
+fn equal_log_in_danger(records: usize) -> (tempfile::TempDir, PathBuf) {
+    let (folder, path) = equal_log_of(0);
+    let (mut bytes, mut record) = (EQUAL.magic.to_vec(), Vec::new());
+    for index in 0..records {
+        encode(index, 1 + index as u32, &[index as u8; EACH], &mut record);
+        bytes.extend_from_slice(&record);
+    }
+    fs::write(&path, bytes).unwrap();
+    (folder, path)
+}
+
+fn corrupt_equal(path: &Path, index: usize) {
+    let mut bytes = fs::read(path).unwrap();
+    bytes[16 + index * 52 + 30] ^= 1;
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn records_of_one_length_are_found_by_their_numbers() {
+    let (_folder, path) = equal_log_of(200);
+    let mut reader = LogReader::open(&path, EQUAL).unwrap();
+    let mut log = Log::open(&path, EQUAL).unwrap();
+    assert_eq!((reader.len(), log.len()), (200, 200));
+    let mut bytes = Vec::new();
+    for index in [0, 70, 199] {
+        reader.read(index, &mut bytes).unwrap();
+        assert_eq!(bytes, [index as u8; EACH]);
+    }
+    log.append(&[200; EACH]).unwrap();
+    assert_eq!((reader.refresh().unwrap(), reader.unchanged()), (201, 200));
+    log.cut(190).unwrap();
+    (190..205).for_each(|_| log.append(&[7; EACH]).unwrap());
+    assert_eq!((reader.refresh().unwrap(), reader.unchanged()), (205, 0));
+    reader.read(190, &mut bytes).unwrap();
+    assert_eq!(bytes, [7; EACH]);
+    // Only the end is read.
+    corrupt_equal(&path, 100);
+    assert_eq!(
+        Log::open(&path, EQUAL).unwrap_err().to_string(),
+        Busy { path: path.clone() }.to_string()
+    );
+    drop(log);
+    assert_eq!(Log::open(&path, EQUAL).unwrap().len(), 205);
+    let damaged = reader.read(100, &mut bytes).unwrap_err().to_string();
+    assert!(damaged.contains("damaged at record 100"), "{damaged}");
+}
+
+#[test]
+fn an_incomplete_record_of_one_length_is_cut_off_whatever_its_length() {
+    let (_folder, path) = equal_log_of(2);
+    let complete = fs::read(&path).unwrap();
+    for length in 0..complete.len() {
+        fs::write(&path, &complete[..length]).unwrap();
+        let expected = length.saturating_sub(MAGIC.len()) / 52;
+        let mut reader = LogReader::open(&path, EQUAL).unwrap();
+        assert_eq!((reader.len(), reader.torn()), (expected, 0));
+        let mut log = Log::open(&path, EQUAL).unwrap();
+        log.append(&[9; EACH]).unwrap();
+        let found = (reader.refresh().unwrap(), reader.unchanged());
+        assert_eq!(found, (expected + 1, expected), "{length} bytes");
+    }
+}
+
+#[test]
+fn records_in_danger_are_cut_off_and_records_that_were_safe_are_refused() {
+    for damaged in 0..6 {
+        let (_folder, path) = equal_log_in_danger(6);
+        corrupt_equal(&path, damaged);
+        let reader = LogReader::open(&path, EQUAL).unwrap();
+        assert_eq!((reader.len(), reader.torn()), (damaged, 6 - damaged));
+        let mut log = Log::open(&path, EQUAL).unwrap();
+        log.append(&[9; EACH]).unwrap();
+        assert_eq!(log.len(), damaged + 1);
+    }
+    // Safe by now: the records after them say so.
+    for damaged in [0, 1] {
+        let (_folder, path) = equal_log_of(3);
+        let mut log = Log::open(&path, EQUAL).unwrap();
+        log.append(&[3; EACH]).unwrap();
+        drop(log);
+        corrupt_equal(&path, damaged);
+        let corrupted = fs::read(&path).unwrap();
+        for error in [
+            LogReader::open(&path, EQUAL).unwrap_err(),
+            Log::open(&path, EQUAL).unwrap_err(),
+        ] {
+            let error = error.to_string();
+            let expected = format!("damaged at record {damaged},");
+            assert!(error.contains(&expected), "{error}");
+        }
+        assert_eq!(fs::read(&path).unwrap(), corrupted);
+    }
+}
+
+#[test]
+fn zeros_in_place_of_the_first_page_of_records_in_danger_are_cut_off() {
+    let (_folder, path) = equal_log_in_danger(20);
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[..512].fill(0);
+    fs::write(&path, bytes).unwrap();
+    let reader = LogReader::open(&path, EQUAL).unwrap();
+    assert_eq!((reader.len(), reader.torn()), (0, 20));
+}
+
+#[test]
+fn a_record_of_one_length_in_a_wrong_place_is_not_valid() {
+    let (_folder, path) = equal_log_in_danger(4);
+    let mut bytes = fs::read(&path).unwrap();
+    bytes.copy_within(16 + 52..16 + 2 * 52, 16 + 2 * 52);
+    fs::write(&path, bytes).unwrap();
+    assert_eq!(LogReader::open(&path, EQUAL).unwrap().len(), 2);
+}
+
+#[test]
+fn a_file_that_was_extended_far_is_refused() {
+    let (_folder, path) = equal_log_of(3);
+    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+    file.set_len(1 << 40).unwrap();
+    let error = LogReader::open(&path, EQUAL).unwrap_err();
+    assert!(matches!(error, LogError::Damaged { .. }), "{error}");
+}
+
+#[test]
+fn the_file_of_another_version_is_told_from_one_of_another_program() {
+    let (_folder, path) = equal_log_of(2);
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[..16].copy_from_slice(b"gyre equal 0   \n");
+    fs::write(&path, bytes).unwrap();
+    let error = Log::open(&path, EQUAL).unwrap_err();
+    assert!(matches!(error, LogError::OtherVersion { .. }), "{error}");
 }

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use gyre_contract::{Item, MotionHeader, PoseHeader, flag};
-use gyre_journal::{self as journal, Journal};
+use gyre_journal::Journal;
 
 use super::add;
 use crate::replay_buffer::{
@@ -46,7 +46,7 @@ fn a_memory_buffer_keeps_the_newest_messages() {
 #[test]
 fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for() {
     let out = tempfile::tempdir().unwrap();
-    let mut journal = Journal::open(&journal::path(out.path())).unwrap();
+    let mut journal = Journal::open(out.path()).unwrap();
     let pose = |seq| PoseHeader {
         item: Item::numbered(seq),
         x_m: seq as f64,

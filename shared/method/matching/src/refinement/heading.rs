@@ -13,6 +13,7 @@ use gyre_geometry::{
     wrap_angle, xy_yaw,
 };
 use nalgebra::{Matrix4, RowVector4, Vector4};
+use serde::{Deserialize, Serialize};
 
 /// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
 /// one of them is wrong: four standard deviations.
@@ -41,7 +42,7 @@ const SCALE: usize = 3;
 const SEEN: RowVector4<f64> = RowVector4::new(1.0, 0.0, 1.0, 0.0);
 
 /// The bias and the scale of the gyro, and the steady error of the radar.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heading {
     pub bias_radps: f64,
     pub yaw_bias_rad: f64,
@@ -54,7 +55,7 @@ pub struct Heading {
     pub verdict: Verdict,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
     /// Noise can bring both so far apart.
     #[default]

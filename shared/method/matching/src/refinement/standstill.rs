@@ -11,6 +11,7 @@ mod tests;
 
 use gyre_geometry::{Pose, UncertainMotion, interpolate, xy_yaw};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::Outcome;
 
@@ -33,7 +34,7 @@ const PRIOR_SCANS: f64 = 8.0;
 /// Bounds how far jitter can widen the limit.
 const MAX_JITTER: f64 = 4.0;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Standstill {
     /// The last reported pose, in the first scan's frame.
     pub reported: Pose,

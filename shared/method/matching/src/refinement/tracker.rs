@@ -3,6 +3,7 @@
 
 use gyre_geometry::{Pose, Twist};
 use nalgebra::{UnitComplex, Vector2};
+use serde::{Deserialize, Serialize};
 
 use super::{
     Heading, Outcome, RefinementConfig, Standstill, WheelState,
@@ -16,7 +17,7 @@ const TWIST_GAIN: f64 = 0.5;
 /// Weight of the newest scan in the running means of overlap and weight.
 const FIT_GAIN: f64 = 0.2;
 
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrackerState {
     pub pose: Pose,
     /// The last two refined scans, newest first. The second one is used if the first turns out to
@@ -58,7 +59,7 @@ impl Step {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Anchor {
     pub pose: Pose,
     pub twist: Twist,

@@ -8,6 +8,7 @@ use gyre_geometry::{
     samples::{WheelDistance, WheelsConfig},
 };
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::heading::{GATE, grown};
 
@@ -16,7 +17,7 @@ const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
 /// Least standard deviation of a scale around 1: the settings may be for other tyres.
 const TYRES: f64 = 0.02;
 
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct WheelState {
     pub scale: f64,
     /// Error of the last pose along the path, against the map, m.

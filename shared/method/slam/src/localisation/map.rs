@@ -2,12 +2,12 @@ use std::path::Path;
 
 use gyre_geometry::Pose;
 use gyre_matching::Submap;
-use gyre_storage::LogError;
+use gyre_storage::{LogError, Record, RecordLog, RecordReader};
 use nalgebra::Point2;
 use thiserror::Error;
 
 use crate::{
-    Keyframe, Record, RecordLog, RecordReader,
+    Keyframe,
     estimation::places::{
         Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceFileError, PlaceIndex,
         SUBMAP_REACH_M, neighbours,

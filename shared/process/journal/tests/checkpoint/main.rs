@@ -8,11 +8,9 @@ use std::{fs, path::Path};
 
 use gyre_contract::{Item, MotionEstimate, PoseHeader};
 use gyre_geometry::SparsePoint;
-use gyre_journal::{
-    JournalError,
-    checkpoint::{self, Checkpoint},
-};
+use gyre_journal::checkpoint::{self, Checkpoint};
 use gyre_matching::{Keyframe, RefinementConfig, Refiner};
+use gyre_storage::LogError;
 use nalgebra::{Isometry2, Vector2};
 
 const WINDOW: usize = 8;
@@ -113,7 +111,7 @@ fn resumed(path: &Path, item: u64) -> (Refiner, Checkpoint) {
     (refinement, checkpoint)
 }
 
-fn restored(path: &Path, item: u64) -> Result<String, JournalError> {
+fn restored(path: &Path, item: u64) -> Result<String, LogError> {
     let mut refinement = refinement();
     open(path)
         .restore(item, &mut refinement)

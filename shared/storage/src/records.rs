@@ -1,23 +1,31 @@
-//! The files of keyframes, of places and of queries, for resuming SLAM. A keyframe is appended
-//! before its pose is journalled. Missing places and queries are computed again, and those beyond
-//! the last keyframe are cut off. The end of the stream is a record without bytes.
+//! The logs of a run, each of one type of record. The end of the stream is a record without bytes.
 
 use std::{
     marker::PhantomData,
     path::{Path, PathBuf},
 };
 
-use gyre_storage::{Log, LogError, LogMagic, LogReader};
+use crate::log::{Log, LogError, LogKind, LogMagic, LogReader};
 
 pub trait Record: Sized {
     const FILE: &'static str;
     /// The start of the file, with the version of the records.
     const MAGIC: LogMagic;
+    /// The bytes of each record if all have the same number, and the log has no end: a log of any
+    /// length is then opened at once.
+    const LENGTH: Option<usize> = None;
 
     /// Appends the form in a file, which is not empty.
     fn encode(&self, bytes: &mut Vec<u8>);
     /// Decodes what [`encode`](Self::encode) has written; `None` if it is something else.
     fn decode(bytes: &[u8]) -> Option<Self>;
+}
+
+const fn kind<R: Record>() -> LogKind {
+    LogKind {
+        magic: R::MAGIC,
+        length: R::LENGTH,
+    }
 }
 
 pub fn records_path<R: Record>(out: &Path) -> PathBuf {
@@ -40,7 +48,7 @@ impl<R: Record> RecordLog<R> {
     }
 
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
-        let log = Log::open(path, R::MAGIC)?;
+        let log = Log::open(path, kind::<R>())?;
         let mut buffer = Vec::new();
         if let Some(last) = log.len().checked_sub(1) {
             log.read(last, &mut buffer)?;
@@ -126,7 +134,7 @@ impl<R: Record> RecordReader<R> {
 
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let mut reader = Self {
-            log: LogReader::open(path, R::MAGIC)?,
+            log: LogReader::open(path, kind::<R>())?,
             ended: false,
             buffer: Vec::new(),
             records: PhantomData,
@@ -157,6 +165,17 @@ impl<R: Record> RecordReader<R> {
         self.len() == 0
     }
 
+    /// Returns the number of records behind the complete ones: those that a power failure has left
+    /// in part. Only for records of one length.
+    pub fn torn(&self) -> usize {
+        self.log.torn()
+    }
+
+    /// Reads the records from `first` on.
+    pub fn from(mut self, first: usize) -> impl Iterator<Item = Result<R, LogError>> {
+        (first..self.len()).map(move |index| self.read(index))
+    }
+
     /// Returns how many of the first records were known before the last [`refresh`](Self::refresh),
     /// and are the same: fewer than were known if some were cut off.
     pub fn unchanged(&self) -> usize {
@@ -173,8 +192,9 @@ impl<R: Record> RecordReader<R> {
         R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
     }
 
-    /// Decodes the first `length` bytes of a record, which are not checked.
-    pub(crate) fn read_start(&mut self, index: usize, length: usize) -> Result<R, LogError> {
+    /// Decodes the first `length` bytes of a record, which are not checked: the checksum covers the
+    /// whole record. Panics beyond the last one.
+    pub fn read_start(&mut self, index: usize, length: usize) -> Result<R, LogError> {
         self.log.read_start(index, length, &mut self.buffer)?;
         R::decode(&self.buffer).ok_or_else(|| self.log.malformed(index))
     }
@@ -183,55 +203,66 @@ impl<R: Record> RecordReader<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Query;
 
-    fn query(keyframe: usize) -> Query {
-        Query {
-            keyframe,
-            candidates: Vec::new(),
+    #[derive(Debug, PartialEq)]
+    struct Number(u32);
+
+    impl Record for Number {
+        const FILE: &'static str = "numbers.log";
+        const MAGIC: LogMagic = *b"gyre numbers 1  ";
+
+        fn encode(&self, bytes: &mut Vec<u8>) {
+            bytes.extend(self.0.to_le_bytes());
+        }
+
+        fn decode(bytes: &[u8]) -> Option<Self> {
+            let number = <[u8; 4]>::try_from(bytes).ok()?;
+            Some(Self(u32::from_le_bytes(number)))
         }
     }
 
     #[test]
     fn records_are_read_while_they_are_appended_until_the_end() {
         let out = tempfile::tempdir().unwrap();
-        let mut reader = RecordReader::<Query>::open(out.path()).unwrap();
+        let mut reader = RecordReader::<Number>::open(out.path()).unwrap();
         assert_eq!((reader.len(), reader.has_ended()), (0, false));
         let mut log = RecordLog::open(out.path()).unwrap();
-        for keyframe in 0..3 {
-            log.append(&query(keyframe)).unwrap();
-            assert_eq!(reader.refresh().unwrap(), keyframe + 1);
-            assert_eq!(reader.read(keyframe).unwrap(), query(keyframe));
+        for number in 0..3 {
+            log.append(&Number(number)).unwrap();
+            assert_eq!(reader.refresh().unwrap(), number as usize + 1);
+            assert_eq!(reader.read(number as usize).unwrap(), Number(number));
         }
         log.end().unwrap();
         log.end().unwrap();
         assert_eq!((reader.refresh().unwrap(), reader.has_ended()), (3, true));
+        let rest: Result<Vec<_>, _> = reader.from(1).collect();
+        assert_eq!(rest.unwrap(), [Number(1), Number(2)]);
     }
 
     #[test]
     fn a_cut_removes_records_and_the_end_and_its_readers_know() {
         let out = tempfile::tempdir().unwrap();
         let mut log = RecordLog::open(out.path()).unwrap();
-        (0..3).for_each(|keyframe| log.append(&query(keyframe)).unwrap());
+        (0..3).for_each(|number| log.append(&Number(number)).unwrap());
         log.end().unwrap();
         drop(log);
-        let mut reader = RecordReader::<Query>::open(out.path()).unwrap();
+        let mut reader = RecordReader::<Number>::open(out.path()).unwrap();
         let mut log = RecordLog::open(out.path()).unwrap();
         assert_eq!(log.len(), 3);
         log.cut(1).unwrap();
-        log.append(&query(7)).unwrap();
+        log.append(&Number(7)).unwrap();
         assert_eq!((reader.refresh().unwrap(), reader.has_ended()), (2, false));
         assert_eq!(reader.unchanged(), 1);
-        assert_eq!(log.read(1).unwrap(), query(7));
+        assert_eq!(log.read(1).unwrap(), Number(7));
     }
 
     #[test]
     fn a_whole_record_of_another_kind_is_refused_with_its_number() {
         let out = tempfile::tempdir().unwrap();
-        let path = records_path::<Query>(out.path());
-        let mut log = Log::open(&path, Query::MAGIC).unwrap();
+        let path = records_path::<Number>(out.path());
+        let mut log = Log::open(&path, kind::<Number>()).unwrap();
         log.append(&[1, 2, 3]).unwrap();
-        let mut reader = RecordReader::<Query>::open(out.path()).unwrap();
+        let mut reader = RecordReader::<Number>::open(out.path()).unwrap();
         let refused = reader.read(0).unwrap_err();
         assert!(refused.to_string().contains("record 0 of"), "{refused}");
         assert!(matches!(refused, LogError::Malformed { .. }));
