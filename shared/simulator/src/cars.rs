@@ -1,35 +1,22 @@
-//! Cars: parked ones, and those that come towards the vehicle on the other lane, with their true
-//! poses in `objects.csv`.
+//! Cars: parked ones, and those that come towards the vehicle on the other lane.
 
-use std::fmt::Write;
-
-use gyre_geometry::{Pose, xy_yaw};
+use gyre_geometry::Pose;
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
 
 use crate::body::{Body, Moving, Scatterer, Wall};
-use crate::profile::Receiver;
 use crate::route::{KERBS_M, Route};
-use crate::simulator::Simulator;
 use crate::stream::Stream;
-use crate::world::World;
 
-pub(crate) const FILE: &str = "objects.csv";
-/// The first row of the file. Poses and velocities are in the world of `ground_truth.tum`.
-const HEADER: &str =
-    "scan,stamp_ns,object,kind,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,visible,counts";
 /// Half of a car's length and width, metres.
-const HALF_M: [f64; 2] = [2.15, 0.9];
+pub(crate) const HALF_M: [f64; 2] = [2.15, 0.9];
 /// Two-way share of the power that passes each diagonal of a car, which stands for its outline: a
 /// line through a car crosses at least one.
 const TRANSMISSION: f64 = 0.9;
-const FIRST_BODY: u32 = 1 << 24;
+pub(crate) const FIRST_BODY: u32 = 1 << 24;
 /// Speed of the oncoming cars, metres a second, and the distance between two, metres.
 const SPEED_MPS: f64 = 8.0;
 const APART_M: std::ops::Range<f64> = 50.0..120.0;
-/// Distance within which cars are reported, metres: a third more than where radars of this kind
-/// resolve a car.
-const REPORTED_M: f64 = 100.0;
 
 /// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide the
 /// space behind. The sum is about 10 m² on each side, the order reported for passenger cars at 77
@@ -121,46 +108,4 @@ impl Cars {
             velocity: (after.translation.vector - before.translation.vector) / 0.2,
         })
     }
-}
-
-/// `objects.csv` as bytes: the moving cars within 100 m at the time of each scan.
-pub(crate) fn objects_csv(simulator: &Simulator, stamps_ns: &[i64]) -> String {
-    let mut text = format!("{HEADER}\n");
-    let receiver = simulator.config().sensor.receiver();
-    for (scan, &stamp_ns) in stamps_ns.iter().enumerate() {
-        let time_s = simulator.drive_time_s(stamp_ns);
-        let place = Point2::from(simulator.path().pose(time_s).translation.vector);
-        for car in simulator.cars.near(place, REPORTED_M, time_s) {
-            let [visible, power] = best_echo(simulator.world(), &receiver, place, &car);
-            let object = car.body.walls[0].body - FIRST_BODY;
-            let ([x, y, yaw], [length, width]) = (xy_yaw(&car.pose), HALF_M);
-            let [vx, vy]: [f64; 2] = car.velocity.into();
-            // Writing to memory cannot fail.
-            let _ = writeln!(
-                text,
-                "{scan},{stamp_ns},{object},car,{x:.4},{y:.4},{yaw:.6},{vx:.4},{vy:.4},{:.2},{:.2},{visible:.4},{:.1}",
-                2.0 * length,
-                2.0 * width,
-                20.0 * power.max(1.0).log10()
-            );
-        }
-    }
-    text
-}
-
-/// The largest share of the power that passes to a part of a car, and the power of its strongest
-/// echo, without scintillation and speckle.
-fn best_echo(world: &World, receiver: &Receiver, from: Point2<f64>, car: &Moving<'_>) -> [f64; 2] {
-    let parts = car.body.scatterers.iter().map(|part| {
-        let there = part.moved(&car.pose);
-        let ray = from - there.position;
-        let range_m = ray.norm().max(1.0);
-        let passed = world.transmission(from, there.position, there.body);
-        let gain = there.gain(ray / range_m);
-        let power = there.cross_section_m2 * gain * receiver.sensitivity(range_m);
-        [passed, power * passed]
-    });
-    parts.fold([0.0; 2], |best: [f64; 2], part| {
-        [best[0].max(part[0]), best[1].max(part[1])]
-    })
 }

@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    simulator::Simulator,
+    path::Path,
     stream::{Episodes, Stream},
 };
 
@@ -39,10 +39,14 @@ pub struct SimulatedGnssConfig {
     pub faults: bool,
 }
 
-/// The fixes during a drive, by their stamps. `None` without a receiver.
-pub(crate) fn fixes(simulator: &Simulator) -> Option<Vec<RawFix>> {
-    let (config, seed) = (&simulator.config().gnss, simulator.config().seed);
-    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
+/// The fixes during a drive along a path, which starts at a time and lasts for a duration, by their
+/// stamps. `None` without a receiver.
+pub(crate) fn fixes(
+    config: &SimulatedGnssConfig,
+    seed: u64,
+    path: &dyn Path,
+    (start_ns, end_s): (i64, f64),
+) -> Option<Vec<RawFix>> {
     (config.rate_hz > 0.0).then(|| {
         let plane = LocalPlane::new(ORIGIN, 0.0);
         let mut rng = Stream::GNSS_ERRORS.generator(seed);
@@ -86,7 +90,12 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SimulationConfig;
+    use crate::{SimulationConfig, simulator::Simulator};
+
+    fn fixes_of(simulator: &Simulator) -> Option<Vec<RawFix>> {
+        let (config, path) = (simulator.config(), simulator.path());
+        fixes(&config.gnss, config.seed, path, simulator.span())
+    }
 
     #[test]
     fn fixes_err_by_as_much_as_they_say_and_holes_have_none() {
@@ -101,7 +110,7 @@ mod tests {
                 ..SimulationConfig::default()
             };
             let simulator = Simulator::new(&config).expect("a drive");
-            let fixes = fixes(&simulator).unwrap_or_default();
+            let fixes = fixes_of(&simulator).unwrap_or_default();
             (simulator, fixes)
         };
         let (simulator, fixes) = simulated(false);
@@ -118,6 +127,6 @@ mod tests {
         let holes = simulated(true).1.len();
         assert!((1200..1300).contains(&holes), "{holes}");
         let without = Simulator::new(&SimulationConfig::default()).expect("a drive");
-        assert_eq!(super::fixes(&without), None);
+        assert_eq!(fixes_of(&without), None);
     }
 }

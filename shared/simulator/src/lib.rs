@@ -9,6 +9,7 @@ pub mod error;
 pub mod gnss;
 pub mod gyro;
 mod layout;
+mod objects;
 pub mod occlusion;
 pub mod output;
 pub mod path;

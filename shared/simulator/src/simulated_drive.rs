@@ -9,16 +9,19 @@ use std::{
 };
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
-use gyre_geometry::{OwnedScan, ScanSlot, samples::Sample};
+use gyre_geometry::{
+    OwnedScan, ScanSlot,
+    samples::{RawFix, Sample},
+};
 use gyre_radar::Trajectory;
 
 use crate::{
-    cars,
     config::SimulationConfig,
     error::SimulatorError,
     gnss,
     gyro::log,
     layout::{self, radiate},
+    objects,
     output::OutputFormat,
     profile::{Chirp, METADATA_BYTES},
     sensor::Sensor,
@@ -131,13 +134,20 @@ impl SimulatedDrive {
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
     /// `imu.csv` has them. `None` without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        log::samples(&self.simulator)
+        let (config, path) = (self.simulator.config(), self.simulator.path());
+        log::samples(&config.gyro, config.seed, path, self.simulator.span())
     }
 
     /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
     /// that measure.
     pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        wheels::samples(&self.simulator)
+        let (config, path) = (self.simulator.config(), self.simulator.path());
+        wheels::samples(&config.wheels, config.seed, path, self.simulator.span())
+    }
+
+    fn fixes(&self) -> Option<Vec<RawFix>> {
+        let (config, path) = (self.simulator.config(), self.simulator.path());
+        gnss::fixes(&config.gnss, config.seed, path, self.simulator.span())
     }
 
     pub(crate) fn side_files(&self) -> Vec<(&'static str, String)> {
@@ -158,8 +168,8 @@ impl SimulatedDrive {
         };
         let truth = String::from_utf8_lossy(&self.ground_truth_tum()).into_owned();
         files.push(("ground_truth.tum", truth));
-        let objects = cars::objects_csv(simulator, &self.stamps_ns());
-        files.push((cars::FILE, objects));
+        let objects = objects::csv(simulator, &self.stamps_ns());
+        files.push((objects::FILE, objects));
         let logs = [
             ("Navtech_Polar.txt", self.stamps()),
             (log::FILE, self.gyro_samples().map(|it| log::csv(&it))),
@@ -167,7 +177,7 @@ impl SimulatedDrive {
                 wheels::FILE,
                 self.wheel_samples().map(|it| wheels::csv(&it)),
             ),
-            (gnss::FILE, gnss::fixes(simulator).map(|it| gnss::csv(&it))),
+            (gnss::FILE, self.fixes().map(|it| gnss::csv(&it))),
         ];
         files.extend(
             logs.into_iter()

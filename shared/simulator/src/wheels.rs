@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     path::Path,
-    simulator::Simulator,
     stream::{Episodes, Stream},
 };
 
@@ -40,11 +39,14 @@ pub struct SimulatedWheelsConfig {
     pub faults: bool,
 }
 
-/// The samples during a drive, by their stamps: each is the mean over its period, stamped at its
-/// middle. `None` without wheels.
-pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
-    let (config, seed) = (&simulator.config().wheels, simulator.config().seed);
-    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
+/// The samples during a drive along a path, which starts at a time and lasts for a duration, by
+/// their stamps: each is the mean over its period, stamped at its middle. `None` without wheels.
+pub(crate) fn samples(
+    config: &SimulatedWheelsConfig,
+    seed: u64,
+    path: &dyn Path,
+    (start_ns, end_s): (i64, f64),
+) -> Option<Vec<Sample>> {
     (config.rate_hz > 0.0).then(|| {
         let mut wheels = Wheels::new(config, seed, path);
         let count = (end_s * config.rate_hz).ceil() as usize;
@@ -113,7 +115,7 @@ impl<'a> Wheels<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SimulationConfig;
+    use crate::{SimulationConfig, simulator::Simulator};
 
     fn simulated(faults: bool) -> (Simulator, Vec<Sample>) {
         let config = SimulationConfig {
@@ -126,7 +128,8 @@ mod tests {
             ..SimulationConfig::default()
         };
         let simulator = Simulator::new(&config).expect("a drive");
-        let samples = samples(&simulator).unwrap_or_default();
+        let (path, span) = (simulator.path(), simulator.span());
+        let samples = samples(&config.wheels, config.seed, path, span).unwrap_or_default();
         (simulator, samples)
     }
 

@@ -21,10 +21,7 @@ mod write;
 pub use datagrams::Datagrams;
 pub use write::{MAX_DATAGRAM_BYTES, write_azimuth, write_description};
 
-use crate::{
-    configuration::Configuration,
-    message::{MAX_PAYLOAD_BYTES, Malformed},
-};
+use crate::{configuration::Configuration, malformed::Malformed, message::MAX_PAYLOAD_BYTES};
 
 /// The category of ASTERIX: the first byte of a message.
 const CATEGORY: u8 = 240;

@@ -4,7 +4,7 @@ use gyre_geometry::MAX_AZIMUTHS;
 use thiserror::Error;
 
 use crate::{
-    message::{Malformed, head},
+    malformed::{Malformed, head},
     protobuf::fields,
 };
 

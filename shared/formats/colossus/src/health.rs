@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::message::Malformed;
+use crate::malformed::Malformed;
 use crate::protobuf::{Value, fields};
 
 const MESSAGE: &str = "health";

@@ -4,6 +4,7 @@
 
 use crate::configuration::{self, Configuration};
 use crate::health::{self, Health};
+use crate::malformed::{Malformed, head};
 
 pub const PORT: u16 = 6317;
 /// The largest payload, bytes.
@@ -152,27 +153,6 @@ fn azimuth<'a>(
         seconds: [s0, s1, s2, s3],
         split_seconds: [p0, p1, p2, p3],
         powers: powers(bytes),
-    })
-}
-
-/// A payload that does not fit its message, or a datagram that is no part of an azimuth: a
-/// sentence.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct Malformed(String);
-
-impl Malformed {
-    pub(crate) fn new(sentence: impl Into<String>) -> Self {
-        Self(sentence.into())
-    }
-}
-
-pub(crate) fn head<const N: usize>(message: &str, payload: &[u8]) -> Result<[u8; N], Malformed> {
-    payload.first_chunk().copied().ok_or_else(|| {
-        let actual = payload.len();
-        Malformed::new(format!(
-            "the payload of {message} has {actual} bytes, expected at least {N}"
-        ))
     })
 }
 

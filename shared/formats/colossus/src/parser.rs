@@ -2,9 +2,8 @@
 
 use thiserror::Error;
 
-use crate::message::{
-    HEADER_BYTES, MAX_PAYLOAD_BYTES, Malformed, Message, SIGNATURE, VERSION, decode,
-};
+use crate::malformed::Malformed;
+use crate::message::{HEADER_BYTES, MAX_PAYLOAD_BYTES, Message, SIGNATURE, VERSION, decode};
 
 /// The most bytes that [`Parser::space`] promises.
 pub const MAX_SPACE_BYTES: usize = 1 << 16;

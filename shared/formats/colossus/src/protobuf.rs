@@ -1,6 +1,6 @@
 //! The fields of a protobuf.
 
-use crate::message::Malformed;
+use crate::malformed::Malformed;
 
 /// The wire type of a float.
 pub(crate) const FOUR_BYTES: u64 = 5;

@@ -12,7 +12,6 @@ use rand_distr::StandardNormal;
 use super::{GyroFigures, SimulatedGyroConfig};
 use crate::{
     path::Path,
-    simulator::Simulator,
     stream::{Episodes, Stream},
 };
 
@@ -30,11 +29,14 @@ const STALL_EVERY_S: f64 = 2.0;
 const STALL_S: f64 = 0.06;
 const LOST: f64 = 0.02;
 
-/// The samples during a drive, by their stamps: rates and accelerations in the gyro's own axes.
-/// `None` without a gyro.
-pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
-    let (config, seed) = (&simulator.config().gyro, simulator.config().seed);
-    let (path, (start_ns, end_s)) = (simulator.path(), simulator.span());
+/// The samples during a drive along a path, which starts at a time and lasts for a duration, by
+/// their stamps: rates and accelerations in the gyro's own axes. `None` without a gyro.
+pub(crate) fn samples(
+    config: &SimulatedGyroConfig,
+    seed: u64,
+    path: &dyn Path,
+    (start_ns, end_s): (i64, f64),
+) -> Option<Vec<Sample>> {
     let figures = config.profile.figures()?;
     let mut errors = Errors::new(&figures, seed);
     let mut clock = Clock::new(config, seed);

@@ -21,7 +21,8 @@ fn drive(profile: GyroProfile, faults: bool, scans: usize) -> (Simulator, Vec<Sa
         ..SimulationConfig::default()
     };
     let simulator = Simulator::new(&config).unwrap();
-    let samples = log::samples(&simulator).unwrap();
+    let (path, span) = (simulator.path(), simulator.span());
+    let samples = log::samples(&config.gyro, config.seed, path, span).unwrap();
     (simulator, samples)
 }
 
