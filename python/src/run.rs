@@ -31,8 +31,8 @@ fn failed(error: RunError) -> PyErr {
 ///
 /// `Run("out/robot")` attaches to the run that writes its results to this folder, `Run()` to the
 /// only one. `poses()`, `scans()` and the others, and `observe(topic)` for each name in `topics`,
-/// are iterators over the messages from now on, until the run ends. An observer changes nothing in
-/// a run: if the loop is slow, it misses messages, which are counted.
+/// are iterators over the last messages and the new ones, until the run ends. It changes nothing in
+/// a run: a slow loop misses messages, which are counted.
 #[pyclass(module = "gyre", unsendable, frozen)]
 pub struct Run(gyre_client::Run);
 

@@ -23,6 +23,7 @@ struct Measured {
 /// Prints a line every two seconds, until the run ends.
 pub(super) fn measure(out: &Path, topic: &'static Topic) -> Result<(), Failure> {
     let run = Run::open(out)?;
+    let begun_ns = clock::now_ns();
     let mut observer = run.observe_topic(topic)?;
     let mut missed = 0;
     loop {
@@ -30,7 +31,8 @@ pub(super) fn measure(out: &Path, topic: &'static Topic) -> Result<(), Failure> 
         let has_ended = loop {
             let left = until.saturating_duration_since(Instant::now());
             match observer.next(left)? {
-                Next::Message(message, _) => measured.add(message),
+                // The publisher first sends the messages that it has kept.
+                Next::Message(message, _) => measured.add(message, begun_ns),
                 Next::Idle if left.is_zero() => break false,
                 Next::Idle => {}
                 Next::Ended => break true,
@@ -50,10 +52,15 @@ pub(super) fn measure(out: &Path, topic: &'static Topic) -> Result<(), Failure> 
 }
 
 impl Measured {
-    fn add<M>(&mut self, message: &Received<M>) {
+    /// Adds a message, unless a stage has published it before this time.
+    fn add<M>(&mut self, message: &Received<M>, begun_ns: i64) {
         let now_ns = clock::now_ns();
         let published = message.item().hops.iter().map(|hop| hop.published_ns);
-        let delay_ns = published.max().filter(|ns| *ns > 0).map(|ns| now_ns - ns);
+        let published = published.max().filter(|ns| *ns > 0);
+        if published.is_some_and(|ns| ns < begun_ns) {
+            return;
+        }
+        let delay_ns = published.map(|ns| now_ns - ns);
         self.received_ns.push(now_ns);
         self.delays_ns.extend(delay_ns);
         self.bytes += message.header_bytes().len() + message.values::<u8>().len();
