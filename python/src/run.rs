@@ -2,30 +2,19 @@
 
 use std::{path::PathBuf, rc::Rc, time::Duration};
 
-use gyre_client::{
-    AnyMessage, MAX_WAIT, RunError, TopicObserver, control::Control, wait_for_readable,
-};
+use gyre_client::{AnyMessage, MAX_WAIT, TopicObserver, control::Control, wait_for_readable};
 use gyre_contract::{
     self as contract, Masked, MaskedHeader, Scan, ScanHeader, Topic, topic_named,
     wire::{Bounds, Described, Kind, Number, Structure, Value},
 };
 use gyre_geometry::{SparsePoint, covariance};
 use pyo3::{
-    exceptions::{PyAttributeError, PyRuntimeError},
+    exceptions::PyAttributeError,
     prelude::*,
     types::{PyDict, PyList, PyTuple},
 };
 
 use crate::{errors, numpy_arrays, values};
-
-fn failed(error: RunError) -> PyErr {
-    match error {
-        RunError::Input(sentence) if sentence.contains("still held") => {
-            PyRuntimeError::new_err(sentence)
-        }
-        error => errors::run(error),
-    }
-}
 
 /// A run that is running on this machine.
 ///
@@ -45,7 +34,7 @@ impl Run {
             Some(out) => gyre_client::Run::open(out),
             None => gyre_client::Run::only(),
         };
-        run.map(Self).map_err(failed)
+        run.map(Self).map_err(errors::run)
     }
 
     /// The folder of the results.
@@ -63,6 +52,7 @@ impl Run {
             .collect()
     }
 
+    /// True when the run has ended, with its results written.
     #[getter]
     fn has_ended(&self) -> bool {
         self.0.has_ended()
@@ -71,7 +61,7 @@ impl Run {
     /// Follows a topic by its name.
     fn observe(&self, topic: &str) -> PyResult<Messages> {
         let topic = topic_named(topic).map_err(errors::run)?;
-        let observer = self.0.observe_topic(topic).map_err(failed)?;
+        let observer = self.0.observe_topic(topic).map_err(errors::run)?;
         let current = None;
         Ok(Messages {
             observer,
@@ -112,17 +102,17 @@ impl Run {
 
     /// Returns the state of the run and of its processes as a dictionary.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        values::dictionary(py, &self.control()?.status().map_err(failed)?)
+        values::dictionary(py, &self.control()?.status().map_err(errors::run)?)
     }
 
     /// Restarts a process of the run by its name.
     fn restart(&self, process: &str) -> PyResult<()> {
-        self.control()?.restart(process).map_err(failed)
+        self.control()?.restart(process).map_err(errors::run)
     }
 
     /// Ends the run. The same command continues it.
     fn down(&self) -> PyResult<()> {
-        self.control()?.stop().map_err(failed)
+        self.control()?.stop().map_err(errors::run)
     }
 
     fn __repr__(&self) -> String {
@@ -132,7 +122,7 @@ impl Run {
 
 impl Run {
     fn control(&self) -> PyResult<Control> {
-        self.0.control().map_err(failed)
+        self.0.control().map_err(errors::run)
     }
 }
 
@@ -161,9 +151,9 @@ impl Messages {
             before.borrow_mut(py).held = None;
         }
         // Its descriptor, so that others run while this thread waits.
-        let descriptor = self.observer.listener().descriptor().map_err(failed)?;
+        let descriptor = self.observer.listener().descriptor().map_err(errors::run)?;
         loop {
-            if let Some(message) = self.observer.hold(Duration::ZERO).map_err(failed)? {
+            if let Some(message) = self.observer.hold(Duration::ZERO).map_err(errors::run)? {
                 let missed = message.missed;
                 let message = Message {
                     held: Some(Rc::new(message)),
@@ -179,8 +169,8 @@ impl Messages {
             }
             py.check_signals()?;
             let waited = py.detach(|| wait_for_readable(&descriptor, MAX_WAIT));
-            waited.map_err(failed)?;
-            self.observer.listener().take().map_err(failed)?;
+            waited.map_err(errors::run)?;
+            self.observer.listener().take().map_err(errors::run)?;
         }
     }
 }
@@ -200,6 +190,7 @@ pub struct Message {
 
 #[pymethods]
 impl Message {
+    /// The name of the topic.
     #[getter]
     fn topic(&self) -> &'static str {
         self.topic.name
@@ -266,7 +257,7 @@ impl Message {
 impl Message {
     fn held(&self) -> PyResult<&Rc<gyre_client::Message<AnyMessage>>> {
         self.held.as_ref().ok_or_else(|| {
-            PyRuntimeError::new_err(
+            errors::run(
                 "this message was released when the next one was asked for: copy what you keep",
             )
         })

@@ -16,10 +16,13 @@ __all__ = [
     "Loop",
     "Masked",
     "Masker",
+    "Message",
+    "Messages",
     "Odometry",
     "Pose",
     "Registered",
     "Report",
+    "Run",
     "Scan",
     "Slam",
     "Trajectory",
@@ -262,7 +265,7 @@ class Message:
     @property
     def topic(self) -> str: ...
     def to_dict(self) -> dict[str, Any]: ...
-    def __getattr__(self, name: str) -> Any: ...
+    def __getattribute__(self, name: str, /) -> Any: ...
 
 def open(data: _Path, config: Config | None = None) -> Dataset: ...
 def find_ground_truth(data: _Path) -> Path | None: ...

@@ -273,7 +273,7 @@ impl<M> Observer<M> {
         Ok(received.map(|(received, missed)| Message {
             received,
             missed,
-            held,
+            _held: held,
         }))
     }
 
@@ -335,17 +335,12 @@ pub struct Message<M> {
     received: Received<M>,
     /// Items that were missed directly before it.
     pub missed: u64,
-    held: Rc<()>,
+    _held: Rc<()>,
 }
 
 impl<M> Message<M> {
     pub fn received(&self) -> &Received<M> {
         &self.received
-    }
-
-    /// Returns what is alive as long as the message is held.
-    pub fn token(&self) -> Rc<()> {
-        Rc::clone(&self.held)
     }
 }
 

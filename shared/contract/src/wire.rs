@@ -45,7 +45,6 @@ pub struct Structure {
     pub type_name: &'static str,
     pub doc: &'static [&'static str],
     pub bytes: usize,
-    pub alignment: usize,
     pub fields: &'static [Field],
 }
 
@@ -196,7 +195,6 @@ macro_rules! describe {
                     type_name: $type_name,
                     doc: &[$($doc),*],
                     bytes: size_of::<Self>(),
-                    alignment: align_of::<Self>(),
                     fields: &[$($crate::wire::Field {
                         name: stringify!($field),
                         kind: <$kind as $crate::wire::Wire>::KIND,
