@@ -175,10 +175,9 @@ impl Messages {
     }
 }
 
-/// A message, whose attributes are the fields of its header: numbers, arrays, and structures of
-/// them. Those of its `item` are attributes too: `seq`, `scan`, `stamp_ns`. Arrays of azimuths,
-/// `power`, `raster` and `points` are views of shared memory, which cannot be written to; the next
-/// message needs that none of them is alive.
+/// A message. Its attributes are the fields of its header and of its `item`, for example `seq`,
+/// `scan` and `stamp_ns`: numbers, arrays, and structures. Arrays of azimuths, `power`, `raster`
+/// and `points` are read-only views of shared memory; drop them before the next message.
 #[pyclass(module = "gyre", unsendable)]
 pub struct Message {
     held: Option<Rc<gyre_client::Message<AnyMessage>>>,
@@ -335,7 +334,7 @@ fn type_string(kind: &Kind) -> Option<&'static str> {
     })
 }
 
-/// Views a part of a payload; `None` for a name that is not one.
+/// Views a part of a payload; `None` for an unknown name.
 fn payload(held: &Rc<gyre_client::Message<AnyMessage>>, topic: &Topic, name: &str) -> Option<View> {
     let received = held.received();
     let header = received.header_bytes();

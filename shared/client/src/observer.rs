@@ -260,7 +260,7 @@ impl<M> Observer<M> {
     }
 
     /// Receives the next message to hold, and waits for it at most `limit`; `None` after that, and
-    /// at the end. One message is held at a time: another one before it is dropped is an error.
+    /// at the end. An observer holds one message at a time: drop a message before the next call.
     pub fn hold(&mut self, limit: Duration) -> Result<Option<Message<M>>, RunError> {
         if Rc::strong_count(&self.held) > 1 {
             return Err(RunError::Input(format!(

@@ -1,4 +1,4 @@
-//! `intake`: what a live radar has delivered, and what was lost.
+//! `intake`: counts of the data that a live radar has delivered, and of lost data.
 
 use crate::{
     control::Received,

@@ -23,7 +23,7 @@ pub trait Header: Described + Default + Debug {
         bytemuck::from_bytes_mut(&mut bytemuck::bytes_of_mut(self)[..size_of::<Item>()])
     }
 
-    /// Checks what the bounds of single fields do not state; the end of the stream has no content.
+    /// Checks the rules beyond the bounds of single fields; the end of the stream has no content.
     fn check_content(&self, _payload: &[u8], _limits: &Limits) -> Result<(), String> {
         Ok(())
     }
@@ -79,8 +79,8 @@ pub enum Use {
     Linked,
     /// Messages have payloads, and a link may lose some.
     Large,
-    /// Each message replaces those before, and its numbers count what it consists of. So a gap is
-    /// no loss.
+    /// Each message replaces the earlier messages, and its numbers count its parts. So a gap is no
+    /// loss.
     Replaces,
 }
 

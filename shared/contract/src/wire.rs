@@ -1,6 +1,5 @@
-//! Types whose bytes travel between processes, described as data: each has a [`Structure`], from
-//! which come the checks where a message enters a process, its values by name, and its layout for
-//! other languages.
+//! Types whose bytes travel between processes. Each type has a description, its [`Structure`]. The
+//! checks of messages, the values by name and the layout for other languages use the description.
 
 mod bounds;
 mod codes;

@@ -1,4 +1,6 @@
-//! Motion in the plane: poses, twists and covariances in SE(2), and the points of a scan.
+//! The types that all parts share: poses, twists and covariances in SE(2), points, polar scans, and
+//! samples of other sensors.
+//!
 //! # Frames and units
 //! Frames follow REP-103: x forward, y left, yaw counter-clockwise. Lengths are in m, angles in
 //! rad, times in s. A motion is the pose of the later frame in the earlier frame. Composition is

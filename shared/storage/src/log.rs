@@ -10,9 +10,9 @@
 //! its bytes, and zeros up to a multiple of four.
 //!
 //! The danger of a record is one more than the number of records before it that were not known to
-//! survive a power failure when it was written. It tells recent records from damaged ones. It is
-//! zero, which says nothing, unless all records have the same length: so the same records of
-//! different lengths are the same file.
+//! survive a power failure when it was written. A damaged record of a log is
+//! therefore recent, or it had been safe. Logs of records of different lengths have 0 there, so
+//! that the same records are the same file.
 
 mod reader;
 #[cfg(test)]
@@ -61,7 +61,7 @@ pub enum LogError {
     /// A record is undamaged, but of a different kind than this log.
     #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
     Malformed { path: PathBuf, record: usize },
-    /// A file lacks records that another one relies on.
+    /// A file lacks records that a different file needs.
     #[error("{0}")]
     Missing(String),
     #[error(transparent)]

@@ -40,7 +40,7 @@ pub enum Bounds {
     OfRun(fn(&Limits) -> f64),
     /// At most a property of the run.
     AtMost(fn(&Limits) -> f64),
-    /// An array of which as many elements have a meaning as the field of this name states.
+    /// An array. The field of this name states how many of its elements have a meaning.
     CountedBy(&'static str),
 }
 

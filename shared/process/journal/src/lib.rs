@@ -3,8 +3,8 @@
 //! [`checkpoint`] of its refinement.
 //!
 //! The journal has each pose with its motion, written before the pose is published; all results of
-//! a run are made from it. [`check`] finds what a death or a power failure has left of the last
-//! poses; those that are lost are computed again.
+//! a run are made from it. After a death or a power failure [`check`] finds the last whole pose;
+//! the run computes the lost poses again.
 
 pub mod checkpoint;
 pub mod keyframes;

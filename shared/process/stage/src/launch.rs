@@ -133,8 +133,8 @@ impl Launch {
         })
     }
 
-    /// Subscribes to a topic, of which `next` is the first item wanted; `None` takes whichever
-    /// arrives first.
+    /// Subscribes to a topic. `next` is the first item that is wanted; with `None` the first item
+    /// that arrives.
     pub fn reader<M: Message>(&self, next: Option<u64>) -> Result<Reader<M>, RunError> {
         Reader::open(&self.node, &self.manifest, next)
     }

@@ -92,7 +92,7 @@ impl Listener {
 }
 
 impl Listener {
-    /// Returns a descriptor of its own, with which another thread can wait.
+    /// Returns a copy of the descriptor, so that a different thread can wait.
     pub fn descriptor(&self) -> Result<OwnedFd, RunError> {
         let descriptor = self.as_fd().try_clone_to_owned();
         descriptor.map_err(|e| RunError::transport(format!("wait for {}", self.event), e))
