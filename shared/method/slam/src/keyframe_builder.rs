@@ -1,8 +1,12 @@
 use std::mem;
 
-use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
+use gyre_geometry::{OdometryMotion, Pose, Twist, UncertainMotion};
 
-use crate::{Keyframe, estimation::places::KeyframeSelector};
+use crate::Keyframe;
+
+/// A scan becomes a keyframe at this distance or rotation from the last keyframe, m and degrees.
+const DISTANCE_M: f64 = 2.0;
+const ANGLE_DEG: f64 = 15.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScanPose {
@@ -33,7 +37,8 @@ impl ScanPose {
 /// a keyframe.
 #[derive(Debug, Clone)]
 pub struct KeyframeBuilder {
-    selector: KeyframeSelector,
+    /// The pose of the last keyframe, and the length of the path through all keyframes up to it, m.
+    last: Option<(Pose, f64)>,
     /// The motion since the last keyframe, with the covariance of its drift.
     motion: UncertainMotion,
 }
@@ -41,7 +46,7 @@ pub struct KeyframeBuilder {
 impl Default for KeyframeBuilder {
     fn default() -> Self {
         Self {
-            selector: KeyframeSelector::default(),
+            last: None,
             motion: UncertainMotion::identity(),
         }
     }
@@ -51,14 +56,27 @@ impl KeyframeBuilder {
     /// Continues after a keyframe, `path_m` along the path, whose pose is given as
     /// [`next`](Self::next) takes it.
     pub fn resume(&mut self, keyframe: &UncertainMotion, path_m: f64) {
-        self.selector.resume(keyframe.motion, path_m);
+        self.last = Some((keyframe.motion, path_m));
         self.motion = UncertainMotion::identity();
     }
 
     /// Takes the next scan. Returns it if it becomes a keyframe, with no points yet.
     pub fn next(&mut self, scan: &ScanPose) -> Option<Keyframe> {
         self.motion = self.motion.then(&scan.motion.drift());
-        let path_m = self.selector.next(&scan.pose.motion)?;
+        let pose = scan.pose.motion;
+        let path_m = match &self.last {
+            None => 0.0,
+            Some((last, path_m)) => {
+                let motion = last.inv_mul(&pose);
+                let distance_m = motion.translation.vector.norm();
+                let angle_rad = motion.rotation.angle().abs();
+                if distance_m < DISTANCE_M && angle_rad < ANGLE_DEG.to_radians() {
+                    return None;
+                }
+                path_m + distance_m
+            }
+        };
+        self.last = Some((pose, path_m));
         let motion = mem::replace(&mut self.motion, UncertainMotion::identity());
         Some(Keyframe {
             seq: scan.seq,
@@ -105,6 +123,20 @@ mod tests {
             }
         };
         (0..count).map(scan).collect()
+    }
+
+    #[test]
+    fn two_metres_or_fifteen_degrees_make_a_keyframe() {
+        let mut builder = KeyframeBuilder::default();
+        let mut path_dm = |x_m: f64, degrees: f64| {
+            let mut scan = scans(1)[0];
+            scan.pose.motion = pose(x_m, 0.0, degrees.to_radians());
+            builder.next(&scan).map(|it| (10.0 * it.path_m).round())
+        };
+        assert_eq!([path_dm(0.0, 0.0), path_dm(1.9, 0.0)], [Some(0.0), None]);
+        assert_eq!([path_dm(2.1, 0.0), path_dm(2.1, 14.0)], [Some(21.0), None]);
+        assert_eq!([path_dm(2.1, 16.0), path_dm(4.0, 16.0)], [Some(21.0), None]);
+        assert_eq!(path_dm(4.2, 16.0), Some(42.0));
     }
 
     #[test]

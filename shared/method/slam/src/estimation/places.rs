@@ -21,7 +21,7 @@ mod verification;
 pub use descriptor::{Describer, Descriptor};
 pub use file::PlaceFileError;
 pub use index::{Candidate, OrderError, PlaceIndex};
-pub use keyframes::{KeyframeSelector, MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
+pub use keyframes::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 pub use registrar::Registrar;
 pub use verification::{LoopVerifier, Verification, VerificationOutcome};
 

@@ -1,7 +1,6 @@
-//! Recognition of drawn and of simulated places.
+//! Recognition of drawn places.
 
 mod descriptors;
 mod files;
 mod loops;
 pub mod scenes;
-mod simulated_street;
