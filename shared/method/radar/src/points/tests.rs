@@ -1,8 +1,7 @@
 use gyre_geometry::{
-    SparsePoint, Twist,
+    SparsePoint,
     scan::{OwnedScan, Sense, flag},
 };
-use nalgebra::{Point2, Vector2};
 use proptest::prelude::*;
 
 use super::{PointExtractor, PointsConfig, WEIGHT_CAP};
@@ -154,73 +153,6 @@ proptest! {
         // With a threshold one step lower there are too many.
         let next = all.iter().map(|point| point.weight).filter(|&weight| few.is_empty() || weight < weakest).fold(0.0, f32::max);
         prop_assert!(all.len() <= capacity || all.iter().filter(|point| point.weight >= next).count() > capacity);
-    }
-}
-
-/// Returns a point in the frame at the scan's stamp, without its Doppler shift.
-fn place(point: &SparsePoint, twist: &Twist) -> Point2<f64> {
-    let [x, y, time_s, _, doppler_s] = <[f32; 5]>::from(*point).map(f64::from);
-    let direction = Vector2::new(x, y).normalize();
-    let shift_m = doppler_s * direction.dot(&Vector2::new(twist.vx_mps, twist.vy_mps));
-    twist.pose_at(time_s) * Point2::from(Vector2::new(x, y) + direction * shift_m)
-}
-
-/// Returns the mean miss of the points near a scatterer.
-fn miss(points: &[SparsePoint], scatterer: &Point2<f64>, twist: &Twist) -> Vector2<f64> {
-    let (mut sum, mut moment) = (0.0, Vector2::zeros());
-    for point in points {
-        let (miss, weight) = (place(point, twist) - scatterer, f64::from(point.weight));
-        if miss.norm() < 4.0 {
-            sum += weight;
-            moment += miss * weight;
-        }
-    }
-    moment / sum
-}
-
-#[test]
-fn compensated_points_of_a_moving_sensor_are_at_the_scatterers() {
-    let twist = Twist {
-        vx_mps: 18.0,
-        vy_mps: -0.4,
-        yaw_rate_radps: 0.4,
-    };
-    // No scatterer is straight ahead, where a moving sensor may see it twice or not at all.
-    let scatterers = (1..8).map(f64::from).map(|k| {
-        let (sin, cos) = (k * std::f64::consts::FRAC_PI_4).sin_cos();
-        Point2::new(cos, sin) * (10.0 + 11.0 * k)
-    });
-    let scatterers: Vec<Point2<f64>> = scatterers.collect();
-    for (sense, chirps_alternate, range_resolution_m) in [
-        (Sense::Clockwise, false, 0.0438),
-        (Sense::CounterClockwise, false, 0.1736),
-        (Sense::Clockwise, true, 0.0438),
-    ] {
-        let sensor = Sensor {
-            twist,
-            sense,
-            chirps_alternate,
-            range_resolution_m,
-            bins: (100.0 / range_resolution_m) as usize,
-            range_offset_m: -0.31,
-            doppler_s: 0.045,
-            ..Sensor::navtech()
-        };
-        let all = PointsConfig {
-            max_range_m: 95.0,
-            ..PointsConfig::default()
-        };
-        let points = extract(&all, &sensor.measure(&scatterers, 0.5), 30);
-        for scatterer in &scatterers {
-            let (miss, range_m) = (miss(&points, scatterer, &twist), scatterer.coords.norm());
-            // The accuracy is half an azimuth in bearing, and a tenth of a cell in range.
-            let along_m = miss.dot(&scatterer.coords).abs() / range_m;
-            let most_m = 0.05 + 0.5 * 0.9_f64.to_radians() * range_m;
-            assert!(
-                along_m < 0.03 && miss.norm() < most_m,
-                "{sense:?} {chirps_alternate}: {scatterer} missed by {miss:?}"
-            );
-        }
     }
 }
 
