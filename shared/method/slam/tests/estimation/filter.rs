@@ -1,6 +1,5 @@
-//! The trajectory filter on cases worked by hand, and on cases of groups and limits.
-
-use std::f64::consts::FRAC_PI_2;
+//! The trajectory filter on wrong loops, groups and limits. Its estimates are compared with those
+//! of the graph in `graph.rs`.
 
 use super::common::{Drive, ODOMETRY, exact};
 use gyre_geometry::{Pose, UncertainMotion, pose, xy_yaw};
@@ -23,48 +22,6 @@ fn straight(motions: usize) -> TrajectoryFilter {
             .unwrap();
     }
     filter
-}
-
-#[test]
-fn a_loop_is_shared_among_the_poses_before_it_by_their_covariance() {
-    let mut filter = straight(2);
-    let before = filter.pose(2).unwrap();
-    assert!((before.covariance[(0, 0)] - 2.0).abs() < 1e-6);
-
-    // Predicted 2 m with variance 2, measured 2.4 m with variance 2: the gain is one half, and one
-    // quarter for the pose half-way.
-    let verdict = filter
-        .apply(&Constraint::closing(0, 2, along(2.4, 2.0)))
-        .unwrap();
-    assert_eq!(verdict.outcome, Outcome::Accepted);
-    assert!((verdict.chi_square - 0.4 * 0.4 / 4.0).abs() < 1e-6);
-    for (keyframe, x_m, variance) in [(0, 0.0, 0.0), (1, 1.1, 0.75), (2, 2.2, 1.0)] {
-        let found = filter.pose(keyframe).unwrap();
-        assert!((found.motion.translation.x - x_m).abs() < 1e-6, "{found:?}");
-        assert!((found.covariance[(0, 0)] - variance).abs() < 1e-6);
-    }
-}
-
-#[test]
-fn an_uncertain_turn_makes_a_later_pose_uncertain_sideways() {
-    let mut filter = TrajectoryFilter::new(Pose::identity(), TrajectoryFilter::MAX_KEYFRAMES);
-    let turn = UncertainMotion {
-        motion: pose(0.0, 0.0, FRAC_PI_2),
-        covariance: Matrix3::from_diagonal(&Vector3::new(1e-12, 1e-12, 1e-4)),
-    };
-    filter.apply(&Constraint::odometry(0, turn)).unwrap();
-    filter
-        .apply(&Constraint::odometry(1, along(10.0, 4.0)))
-        .unwrap();
-    let end = filter.pose(2).unwrap();
-    assert!((end.motion.translation.vector - Vector3::new(0.0, 10.0, 0.0).xy()).norm() < 1e-12);
-    // 10 m to the left at 0.01 rad: 0.1 m along x. The second motion's x is now y.
-    let expected = Matrix3::new(0.01, 0.0, -1e-3, 0.0, 4.0, 0.0, -1e-3, 0.0, 1e-4);
-    assert!(
-        (end.covariance - expected).norm() < 1e-6,
-        "{}",
-        end.covariance
-    );
 }
 
 #[test]

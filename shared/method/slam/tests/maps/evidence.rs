@@ -125,14 +125,6 @@ fn a_keyframe_is_drawn_anew_beyond_a_fraction_of_a_cell() {
 }
 
 #[test]
-fn the_order_of_keyframes_changes_no_cell() {
-    let mut drive = drive(20, &wall());
-    let forward = images(&mut drawn(&drive));
-    drive.reverse();
-    assert_eq!(images(&mut drawn(&drive)), forward);
-}
-
-#[test]
 fn a_point_that_is_nowhere_is_left_out() {
     let at = pose(0.0, 0.0, 0.0);
     let mut strange = keyframe(0, &at, &wall());
