@@ -5,8 +5,8 @@ mod counts;
 use std::{fmt::Write, path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
-use gyre_slam::estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex, Verification};
-use gyre_geometry::xy_yaw;
+use gyre_slam::{LoopCandidate, estimation::places::{Candidate, Describer, Descriptor, PlaceIndex, Registrar}};
+use gyre_geometry::{wrap_angle, xy_yaw};
 use gyre_configuration::terminal::Failure;
 use nalgebra::Vector3;
 
@@ -44,7 +44,9 @@ struct Checked {
     /// Number of the queried keyframe, and of the found one.
     query: usize,
     place: usize,
-    verification: Verification,
+    verification: LoopCandidate,
+    /// The yaw differs from the candidate's by half a turn.
+    half_turn: bool,
     /// x, y (m) and yaw (rad) of the motion less the true one, along the axes of the found
     /// keyframe.
     error: Vector3<f64>,
@@ -63,7 +65,7 @@ pub fn places(arguments: &PlacesArguments) -> Result<ExitCode, Failure> {
     let start = Instant::now();
     let (mut index, descriptors) = describe(&mut drive)?;
     let mut counts = Counts::new(start.elapsed());
-    let mut verifier = LoopVerifier::new(&drive.refinement, drive.capacity)?;
+    let mut registrar = Registrar::new(&drive.refinement, drive.capacity)?;
     let mut rows = String::from(HEADER);
     for (query, descriptor) in descriptors.iter().enumerate() {
         let eligible = index.places_until(drive.path_m[query] - arguments.gap_m);
@@ -83,10 +85,9 @@ pub fn places(arguments: &PlacesArguments) -> Result<ExitCode, Failure> {
         for candidate in candidates.iter().take(VERIFIED) {
             drive.draw(candidate.place, 1);
             let start = Instant::now();
-            let verification = verifier.verify(&drive.submaps[0], &drive.submaps[1], candidate);
+            let verification = registrar.verify(&drive.submaps[0], &drive.submaps[1], candidate);
             counts.verification.add(start.elapsed());
-            let place = candidate.place;
-            if let Some(checked) = check(&drive, [query, place], verification, arguments.wrong_m) {
+            if let Some(checked) = check(&drive, query, candidate, verification, arguments.wrong_m) {
                 counts.add(&drive, &checked);
                 checked.write(&drive, &mut rows)?;
             }
@@ -116,16 +117,20 @@ fn describe(drive: &mut Drive) -> Result<(PlaceIndex, Vec<Descriptor>), Failure>
 /// Compares a verified candidate with the truth; `None` without truth.
 fn check(
     drive: &Drive,
-    [query, place]: [usize; 2],
-    verification: Verification,
+    query: usize,
+    candidate: &Candidate,
+    verification: LoopCandidate,
     wrong_m: f64,
 ) -> Option<Checked> {
+    let place = candidate.place;
     let [later, earlier] = [query, place].map(|k| drive.truths[k]);
     let truth = earlier?.inv_mul(&later?);
     let error = verification.motion.error(&truth);
+    let turned_rad = verification.motion.motion.rotation.angle() - candidate.yaw_rad;
     Some(Checked {
         query,
         place,
+        half_turn: wrap_angle(turned_rad).abs() > std::f64::consts::FRAC_PI_2,
         verification,
         is_wrong: error.xy().norm() > wrong_m || error.z.abs() > WRONG_DEG.to_radians(),
         error,
@@ -147,7 +152,7 @@ impl Checked {
         write!(
             rows,
             "{:.4},{:.4},{:.4},{},",
-            found.correlation, found.searched, found.runner_up, found.half_turn
+            found.correlation, found.searched, found.runner_up, self.half_turn
         )?;
         write!(rows, "{:?},", found.outcome)?;
         for value in self.error.iter().chain(&sigma) {

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, time::Duration};
 
-use gyre_slam::estimation::places::{Candidate, Descriptor, VerificationOutcome};
+use gyre_slam::{LoopOutcome, estimation::places::{Candidate, Descriptor}};
 
 use super::Checked;
 use crate::{
@@ -110,7 +110,7 @@ impl Counts {
         } else if checked.distance_m < NEAR_M[0] {
             self.correlations[1] = self.correlations[1].min(found.correlation);
         }
-        if found.outcome != VerificationOutcome::Accepted {
+        if found.outcome != LoopOutcome::Accepted {
             return;
         }
         if checked.is_wrong {

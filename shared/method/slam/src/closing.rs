@@ -13,7 +13,7 @@ use crate::{
     estimation::{
         Constraint, EstimationError, GraphOptions, Outcome, PoseGraph,
         places::{
-            Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
+            Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceIndex, Registrar,
             neighbours,
         },
     },
@@ -44,7 +44,7 @@ pub enum ClosingError<E> {
 pub struct LoopCloser {
     submap_reach_m: f64,
     describer: Describer,
-    verifier: LoopVerifier,
+    registrar: Registrar,
     index: PlaceIndex,
     /// The odometry alone, against which loops are tested.
     odometry: PoseGraph,
@@ -67,7 +67,7 @@ impl LoopCloser {
         let submap = || Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1));
         Ok(Self {
             describer: Describer::new(),
-            verifier: LoopVerifier::new(refinement, capacity)?,
+            registrar: Registrar::new(refinement, capacity)?,
             index: PlaceIndex::default(),
             odometry: PoseGraph::new(Pose::identity(), GraphOptions::default()),
             path_m: Vec::new(),
@@ -219,31 +219,17 @@ impl LoopCloser {
         candidate: &Candidate,
     ) -> Result<LoopCandidate, EstimationError> {
         let [later, earlier] = &self.submaps;
-        let found = self.verifier.verify(later, earlier, candidate);
+        let mut found = self.registrar.verify(later, earlier, candidate);
         // As it is read from a file.
-        let motion = UncertainMotion {
-            covariance: covariance::unpack(&covariance::pack(&found.motion.covariance)),
-            ..found.motion
-        };
-        let mut outcome = found.outcome;
-        let mut chi_square = f64::NAN;
-        if outcome == LoopOutcome::Accepted {
-            let closing = Constraint::closing(candidate.place, keyframe, motion);
+        found.motion.covariance = covariance::unpack(&covariance::pack(&found.motion.covariance));
+        if found.outcome == LoopOutcome::Accepted {
+            let closing = Constraint::closing(found.place, keyframe, found.motion);
             let verdict = self.odometry.test(&closing)?;
-            chi_square = verdict.chi_square;
+            found.chi_square = verdict.chi_square;
             if verdict.outcome == Outcome::Rejected {
-                outcome = LoopOutcome::ContradictsOdometry;
+                found.outcome = LoopOutcome::ContradictsOdometry;
             }
         }
-        Ok(LoopCandidate {
-            place: candidate.place,
-            similarity: candidate.score,
-            motion,
-            correlation: found.correlation,
-            searched: found.searched,
-            runner_up: found.runner_up,
-            chi_square,
-            outcome,
-        })
+        Ok(found)
     }
 }

@@ -2,7 +2,7 @@
 //! between the two.
 //!
 //! Submaps of sparse points, laid together by odometry, are described by their polar magnitude
-//! spectrum ([`Describer`]), compared ([`PlaceIndex`]), and registered ([`LoopVerifier`]). A motion
+//! spectrum ([`Describer`]), compared ([`PlaceIndex`]), and registered ([`Registrar`]). A motion
 //! is the pose of the queried (later) keyframe in the frame of the found (earlier) one. Everything
 //! is planned once: nothing is allocated afterwards but when a keyframe is added.
 //!
@@ -23,7 +23,6 @@ pub use file::PlaceFileError;
 pub use index::{Candidate, OrderError, PlaceIndex};
 pub use keyframes::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 pub use registrar::Registrar;
-pub use verification::{LoopVerifier, Verification, VerificationOutcome};
 
 /// Cells per side of a submap's raster, and their size: 102 m to each side.
 const RASTER_CELLS: usize = 255;

@@ -8,7 +8,7 @@ use std::{
 
 use gyre_geometry::pose;
 use gyre_matching::RefinementConfig;
-use gyre_slam::estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex};
+use gyre_slam::estimation::places::{Describer, Descriptor, PlaceIndex, Registrar};
 
 use crate::estimation::places::scenes;
 
@@ -46,10 +46,10 @@ fn describing_querying_and_verifying_allocate_nothing() {
             .insert(k as u64, 20.0 * k as f64, &descriptor)
             .unwrap();
     }
-    let mut verifier = LoopVerifier::new(&RefinementConfig::default(), 8192).unwrap();
+    let mut registrar = Registrar::new(&RefinementConfig::default(), 8192).unwrap();
     let before = ALLOCATIONS.with(Cell::get);
     describer.describe(&submaps[7], &mut descriptor);
     let found = index.query(&descriptor, 40, 15.0)[0];
-    verifier.verify(&submaps[7], &submaps[found.place], &found);
+    registrar.verify(&submaps[7], &submaps[found.place], &found);
     assert_eq!((ALLOCATIONS.with(Cell::get), found.place), (before, 7));
 }

@@ -4,22 +4,22 @@ use std::f64::consts::PI;
 
 use gyre_geometry::{Pose, pose, wrap_angle};
 use gyre_matching::{RefinementConfig, Submap};
-use gyre_slam::estimation::places::{Candidate, LoopVerifier, Verification, VerificationOutcome};
+use gyre_slam::{
+    LoopCandidate, LoopOutcome,
+    estimation::places::{Candidate, Registrar},
+};
 use proptest::prelude::*;
 
 use super::scenes;
 
-fn verifier() -> LoopVerifier {
-    LoopVerifier::new(&RefinementConfig::default(), 8192).unwrap()
-}
-
-fn verify(later: &Submap, earlier: &Submap, yaw_rad: f64) -> Verification {
+fn verify(later: &Submap, earlier: &Submap, yaw_rad: f64) -> LoopCandidate {
     let candidate = Candidate {
         place: 0,
         score: 1.0,
         yaw_rad,
     };
-    verifier().verify(later, earlier, &candidate)
+    let mut registrar = Registrar::new(&RefinementConfig::default(), 8192).unwrap();
+    registrar.verify(later, earlier, &candidate)
 }
 
 proptest! {
@@ -33,8 +33,7 @@ proptest! {
         // The descriptors know the angle up to half a turn.
         let half = 0.5 * wrap_angle(2.0 * (yaw + off));
         let found = verify(&later, &earlier, half);
-        prop_assert_eq!(found.outcome, VerificationOutcome::Accepted);
-        prop_assert_eq!(found.half_turn, wrap_angle(half - yaw).abs() > 1.0);
+        prop_assert_eq!(found.outcome, LoopOutcome::Accepted);
         let error = found.motion.error(&truth);
         prop_assert!(error.xy().norm() < 0.03 && error.z.abs() < 1e-3, "{error}");
         prop_assert!(found.motion.has_covariance());
@@ -46,11 +45,7 @@ fn other_places_are_rejected() {
     let seen = |seed| scenes::seen(&scenes::place(seed), &Pose::identity());
     for seed in 0..5 {
         let found = verify(&seen(seed), &seen(seed + 1), 0.3);
-        assert_eq!(
-            found.outcome,
-            VerificationOutcome::LowCorrelation,
-            "{found:?}"
-        );
+        assert_eq!(found.outcome, LoopOutcome::LowCorrelation, "{found:?}");
     }
 }
 
@@ -63,7 +58,7 @@ fn a_place_that_repeats_itself_is_ambiguous() {
     let earlier = scenes::seen(&grid, &Pose::identity());
     for yaw in [0.0, PI] {
         let found = verify(&scenes::seen(&grid, &pose(1.0, 2.0, yaw)), &earlier, 0.0);
-        assert_eq!(found.outcome, VerificationOutcome::Ambiguous, "{found:?}");
+        assert_eq!(found.outcome, LoopOutcome::Ambiguous, "{found:?}");
     }
 }
 
@@ -74,7 +69,7 @@ fn empty_submaps_and_points_that_are_not_finite_are_no_loop() {
     for bad in [&Submap::default(), &nan] {
         for (later, earlier) in [(bad, &place), (&place, bad), (bad, bad)] {
             let found = verify(later, earlier, 0.0);
-            assert_eq!(found.outcome, VerificationOutcome::LowCorrelation);
+            assert_eq!(found.outcome, LoopOutcome::LowCorrelation);
             assert_eq!(found.correlation, 0.0);
         }
     }
