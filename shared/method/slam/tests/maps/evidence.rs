@@ -145,37 +145,26 @@ fn a_point_that_is_nowhere_is_left_out() {
 #[test]
 fn options_out_of_bounds_are_refused_by_name() {
     type Change = fn(&mut MapOptions);
-    let reach = "must be beyond near_m, and 1 to 2000 cells";
-    let wrong: [(Change, &str); 8] = [
-        (|it| it.cell_m = 0.0, "cell_m is 0, but must be 0.05 to 5"),
-        (
-            |it| it.cell_m = f64::NAN,
-            "cell_m is NaN, but must be 0.05 to 5",
-        ),
-        (|it| it.near_m = -1.0, "near_m is -1, but must be 0 to 1000"),
-        (|it| it.reach_m = 5.0, &format!("reach_m is 5, but {reach}")),
-        (
-            |it| it.reach_m = 401.0,
-            &format!("reach_m is 401, but {reach}"),
-        ),
+    let reach = "beyond near_m, and 1 to 2000 cells";
+    let wrong: [(Change, &str, &str); 8] = [
+        (|it| it.cell_m = 0.0, "cell_m is 0", "0.05 to 5"),
+        (|it| it.cell_m = f64::NAN, "cell_m is NaN", "0.05 to 5"),
+        (|it| it.near_m = -1.0, "near_m is -1", "0 to 1000"),
+        (|it| it.reach_m = 5.0, "reach_m is 5", reach),
+        (|it| it.reach_m = 401.0, "reach_m is 401", reach),
         (
             |it| it.half_weight_m = 0.0,
-            "half_weight_m is 0, but must be 0.1 to 10000",
+            "half_weight_m is 0",
+            "0.1 to 10000",
         ),
-        (
-            |it| it.bearing_deg = 5.1,
-            "bearing_deg is 5.1, but must be 0 to 5",
-        ),
-        (
-            |it| it.bearing_deg = -0.1,
-            "bearing_deg is -0.1, but must be 0 to 5",
-        ),
+        (|it| it.bearing_deg = 5.1, "bearing_deg is 5.1", "0 to 5"),
+        (|it| it.bearing_deg = -0.1, "bearing_deg is -0.1", "0 to 5"),
     ];
-    for (change, words) in wrong {
+    for (change, found, bounds) in wrong {
         let mut options = MapOptions::default();
         change(&mut options);
         let refused = options.validate().unwrap_err().to_string();
-        assert_eq!(refused, format!("the map's {words}"));
+        assert_eq!(refused, format!("the map's {found}, but must be {bounds}"));
     }
     assert!(MapOptions::default().validate().is_ok());
 }

@@ -1,6 +1,6 @@
 //! Maps as files, read back.
 
-use std::{fs, io::Cursor, path::Path};
+use std::{collections::HashMap, fs, io::Cursor, path::Path};
 
 use gyre_slam::mapping::*;
 use tiff::{
@@ -127,36 +127,17 @@ fn pgm_and_yaml_say_what_is_occupied_free_and_unknown_and_where() {
     let mut map = written(folder.path());
     write_pgm(folder.path(), &mut map).unwrap();
     let yaml = fs::read_to_string(folder.path().join("map.yaml")).unwrap();
-    let value = |key: &str| {
-        let line = yaml
-            .lines()
-            .find_map(|line| line.strip_prefix(key))
-            .unwrap();
-        line.trim_start_matches(": ").to_owned()
-    };
-    assert_eq!(value("image"), "map.pgm");
-    let resolution: f64 = value("resolution").parse().unwrap();
-    let origin: Vec<f64> = value("origin")
-        .trim_matches(['[', ']'])
-        .split(", ")
-        .map(|number| number.parse().unwrap())
-        .collect();
+    let map: HashMap<&str, &str> = yaml.lines().filter_map(|it| it.split_once(": ")).collect();
+    assert_eq!(map["image"], "map.pgm");
+    let resolution: f64 = map["resolution"].parse().unwrap();
+    let origin: [f64; 3] = serde_json::from_str(map["origin"]).unwrap();
     let bytes = fs::read(folder.path().join("map.pgm")).unwrap();
-    let header = bytes
-        .iter()
-        .enumerate()
-        .filter(|(_, byte)| **byte == b'\n')
-        .nth(2);
-    let (header, pixels) = bytes.split_at(header.unwrap().0 + 1);
-    let header = String::from_utf8(header.to_vec()).unwrap();
-    let numbers: Vec<usize> = header
-        .split_whitespace()
-        .skip(1)
-        .map(|n| n.parse().unwrap())
-        .collect();
-    let [width, height, 255] = numbers[..] else {
-        panic!("{header}");
+    let parts: Vec<&[u8]> = bytes.splitn(4, |byte| *byte == b'\n').collect();
+    let [b"P5", size, b"255", pixels] = parts[..] else {
+        panic!("{:?}", &bytes[..20]);
     };
+    let size = std::str::from_utf8(size).unwrap().split_once(' ').unwrap();
+    let [width, height]: [usize; 2] = [size.0, size.1].map(|side| side.parse().unwrap());
     assert_eq!(pixels.len(), width * height);
     let at = |x_m: f64, y_m: f64| {
         let column = ((x_m - origin[0]) / resolution) as usize;
