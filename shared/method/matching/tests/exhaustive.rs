@@ -1,9 +1,8 @@
-//! The exhaustive search against direct sums and known motions, and the inputs that it rejects.
+//! The exhaustive search on known motions, and the inputs that it rejects.
 
 use crate::common::{Motion, Numbers, draw, pair, pair_of, scene_aside};
 use gyre_matching::{ExhaustiveConfig, ExhaustiveSearch, JointMatch, Overlap, Peak};
 use ndarray::Array2;
-use proptest::prelude::*;
 
 fn search(
     n: usize,
@@ -26,83 +25,6 @@ fn errors(found: &JointMatch, motion: Motion) -> [f64; 3] {
         found.motion.y_m - motion.y,
         (turn - std::f64::consts::PI).to_degrees(),
     ]
-}
-
-/// g at (row, col), bilinear; zero outside.
-fn value(g: &[f32], n: usize, row: f64, col: f64) -> f64 {
-    let last = (n - 1) as f64 + 1e-9;
-    if !(0.0..=last).contains(&row) || !(0.0..=last).contains(&col) {
-        return 0.0;
-    }
-    let (i, j) = (
-        (row.floor() as usize).min(n - 2),
-        (col.floor() as usize).min(n - 2),
-    );
-    let (a, b) = (row - i as f64, col - j as f64);
-    let [p, q, r, s] =
-        [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| f64::from(g[i * n + j]));
-    (1.0 - a) * ((1.0 - b) * p + b * q) + a * ((1.0 - b) * r + b * s)
-}
-
-/// R x + o, as (row, col).
-fn looked_up(n: usize, [row, col]: [isize; 2], (angle_rad, o): (f64, f64)) -> (f64, f64) {
-    let ((sin, cos), middle) = (angle_rad.sin_cos(), (n - 1) as f64 / 2.0);
-    let (u, v) = (row as f64 - middle, col as f64 - middle);
-    (
-        middle + o + cos * u - sin * v,
-        middle + o + sin * u + cos * v,
-    )
-}
-
-/// Sum of f(x) g(R (x + s) + o) over the cells of f, s by whole cells.
-fn direct_sum(f: &[f32], g: &[f32], n: usize, turn: (f64, f64), [down, right]: [isize; 2]) -> f64 {
-    let inside = |v: isize| (0..n as isize).contains(&v);
-    (0..n * n)
-        .filter_map(|k| {
-            let (row, col) = ((k / n) as isize + down, (k % n) as isize + right);
-            let at = looked_up(n, [row, col], turn);
-            (inside(row) && inside(col)).then(|| f64::from(f[k]) * value(g, n, at.0, at.1))
-        })
-        .sum()
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
-    #[test]
-    fn the_best_of_all_angles_and_shifts_is_that_of_the_direct_sums(
-        n in 20_usize..25,
-        g in prop::collection::vec(0.0_f32..1.0, 24 * 24),
-        (k, down, right) in (-1..=1, -3_isize..=3, -3_isize..=3),
-    ) {
-        // Angles of 9 degrees, shifts of up to 3 cells of 1 m. f is g seen after one of these
-        // motions.
-        let g: Vec<f32> = g[..n * n].iter().map(|v| v.powi(4)).collect();
-        let angle = |k: i32| (9.0 * f64::from(k)).to_radians();
-        let moved = |at: usize| {
-            let x = [(at / n) as isize + down, (at % n) as isize + right];
-            let (row, col) = looked_up(n, x, (angle(k), 0.0));
-            value(&g, n, row, col) as f32
-        };
-        let f: Vec<f32> = (0..n * n).map(moved).collect();
-        let config = ExhaustiveConfig {
-            reach_deg: 18.0,
-            step_deg: 9.0,
-            reach_m: 3.0,
-            overlap: Overlap::None,
-            peak: Peak::Parabola,
-        };
-        let raster = |cells: &[f32]| Array2::from_shape_vec((n, n), cells.to_vec()).unwrap();
-        let found = search(n, 1.0, &config, &raster(&g), &raster(&f)).motion;
-        // Angles are compared by rasters read between the cells, all blurred alike.
-        let all = (-2..=2).flat_map(|k| (-3..=3).flat_map(move |i| (-3..=3).map(move |j| (k, [i, j]))));
-        let summed = all.map(|(k, s)| (k, s, direct_sum(&f, &g, n, (angle(k), 0.2113), s)));
-        let (best, [i, j], _) = summed.max_by(|a, b| a.2.total_cmp(&b.2)).unwrap();
-        let turn = nalgebra::Rotation2::new(angle(best));
-        let place = turn * nalgebra::Vector2::new(i as f64, j as f64) * -1.0;
-        let off = [found.x_m - place.x, found.y_m - place.y];
-        let turned = nalgebra::Rotation2::new(found.yaw_rad).rotation_to(&turn).angle().to_degrees();
-        prop_assert!(off[0].hypot(off[1]) < 1.3 && turned.abs() < 7.0, "{found:?}: {best} {i} {j}");
-    }
 }
 
 /// A rotation by zero does not blur; without compensation the peak would be pushed off zero.
