@@ -4,7 +4,7 @@
 //! Submaps of sparse points, laid together by odometry, are described by their polar magnitude
 //! spectrum ([`Describer`]), compared ([`PlaceIndex`]), and registered ([`Registrar`]). A motion
 //! is the pose of the queried (later) keyframe in the frame of the found (earlier) one. Everything
-//! is planned once: nothing is allocated afterwards but when a keyframe is added.
+//! is planned once.
 //!
 //! - The verification: at both angles the translation within 25 m, the alignment of both keyframes'
 //!   own points, and the masked correlation there, which must be high and clearly above every

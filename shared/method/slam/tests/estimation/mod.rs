@@ -7,7 +7,6 @@ mod consistency;
 mod filter;
 mod g2o;
 mod graph;
-mod place_allocations;
 mod places;
 mod positions;
 mod wrong_loops;

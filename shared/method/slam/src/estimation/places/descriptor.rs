@@ -25,8 +25,7 @@ pub struct Descriptor {
     pub(super) sieve: Vec<u8>,
 }
 
-/// Computes descriptors.
-/// Planned once; nothing is allocated afterwards.
+/// Computes descriptors. Planned once.
 pub struct Describer {
     search: RotationSearch,
     raster: Array2<f32>,

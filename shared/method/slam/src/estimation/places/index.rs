@@ -35,7 +35,6 @@ pub struct OrderError {
 }
 
 /// The descriptors of all places, in the order of the path.
-/// A query allocates nothing.
 pub struct PlaceIndex {
     /// The id and the path of each place.
     pub(super) places: Vec<(u64, f64)>,
@@ -88,7 +87,6 @@ impl PlaceIndex {
         self.sieves.extend_from_slice(&descriptor.sieve);
         self.spectra.extend_from_slice(&descriptor.spectrum);
         self.norms.push(norm(&descriptor.spectrum));
-        self.query.reserve(self.places.len());
         Ok(self.places.len() - 1)
     }
 
@@ -161,11 +159,6 @@ impl Query {
             inverse,
             found: Vec::with_capacity(SHORTLIST),
         }
-    }
-
-    fn reserve(&mut self, places: usize) {
-        self.distances.clear();
-        self.distances.reserve(places);
     }
 
     /// Keeps the places that are nearest in the sieve, of equal ones the earlier.

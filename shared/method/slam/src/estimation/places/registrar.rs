@@ -14,7 +14,7 @@ const MASK_M: f64 = 80.0;
 /// Largest translation between two places, along each axis, m.
 const REACH_M: f64 = 25.0;
 
-/// Registers a later submap with an earlier one. Planned once; nothing is allocated afterwards.
+/// Registers a later submap with an earlier one. Planned once.
 ///
 /// `seen` is 1 in the cells that the later sensor could see, and 0 elsewhere; `None` if it could
 /// see all.

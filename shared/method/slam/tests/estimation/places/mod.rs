@@ -3,4 +3,4 @@
 mod descriptors;
 mod files;
 mod loops;
-pub mod scenes;
+mod scenes;
