@@ -76,7 +76,12 @@ fn only_eligible_places_are_found_and_those_near_a_better_one_are_left_out() {
         .map(|seed| describe(&scenes::seen(&scenes::place(seed), &Pose::identity())))
         .collect();
     let mut index = index_of(&descriptors);
-    assert_eq!(index.query(&descriptors[40], 50, 0.0)[0].place, 40);
+    let best = index.query(&descriptors[40], 50, 0.0)[0];
+    assert_eq!(best.place, 40);
+    assert!((best.score - 1.0).abs() < 1e-4 && best.yaw_rad.abs() < 1e-3);
+    let by_angles = index.rank_all(&descriptors[40], 3);
+    assert!(by_angles[0] == best && by_angles.len() > 50);
+    assert!(by_angles.is_sorted_by(|a, b| a.score >= b.score));
     assert_eq!(index.query(&descriptors[40], 50, 0.0).len(), 32);
     assert!(
         index
