@@ -305,48 +305,9 @@ impl RotationSearch {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     const N: usize = 24;
-
-    /// The polar magnitudes of a raster, ring by ring, each less its mean.
-    fn rings(search: &mut RotationSearch, raster: &[f32]) -> Vec<Vec<f64>> {
-        search.magnitudes(raster);
-        let mut ring = vec![0.0; search.grid.angles];
-        let radii = 0..search.grid.radii;
-        let mut all: Vec<Vec<f64>> = radii
-            .map(|r| {
-                search.grid.ring(r, &mut ring);
-                ring.iter().map(|&v| f64::from(v)).collect()
-            })
-            .collect();
-        if search.config.form == RotationForm::ProfileMean {
-            all = vec![
-                (0..ring.len())
-                    .map(|k| all.iter().map(|ring| ring[k]).sum())
-                    .collect(),
-            ];
-        }
-        for ring in &mut all {
-            let mean = ring.iter().sum::<f64>() / ring.len() as f64;
-            ring.iter_mut().for_each(|v| *v -= mean);
-        }
-        all
-    }
-
-    /// sum over r and k of P_g[r, k + m] P_f[r, k], as a correlation coefficient.
-    fn direct(f: &[Vec<f64>], g: &[Vec<f64>], m: usize) -> f64 {
-        let energy = |p: &[Vec<f64>]| p.iter().flatten().map(|v| v * v).sum::<f64>();
-        let along = |f: &[f64], g: &[f64]| {
-            (0..f.len())
-                .map(|k| f[k] * g[(k + m) % f.len()])
-                .sum::<f64>()
-        };
-        let sum: f64 = f.iter().zip(g).map(|(f, g)| along(f, g)).sum();
-        sum / (energy(f) * energy(g)).sqrt()
-    }
 
     #[test]
     fn a_higher_peak_far_from_the_turn_of_the_gyro_is_not_taken() {
@@ -377,29 +338,5 @@ mod tests {
         assert!((found(Some(-18.0)) + 20.0).abs() < 0.5);
         let beyond = found(Some(80.0));
         assert!((26.0..=30.0).contains(&beyond), "within reach: {beyond}");
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
-        #[test]
-        fn both_forms_equal_their_direct_sums(
-            f in prop::collection::vec(0.0_f32..10.0, N * N),
-            g in prop::collection::vec(0.0_f32..10.0, N * N),
-            angles in 30_usize..45,
-            profile in any::<bool>(),
-        ) {
-            let form = if profile { RotationForm::ProfileMean } else { RotationForm::Eq7 };
-            let config = RotationConfig { form, angles, ..RotationConfig::default() };
-            let mut search = RotationSearch::new(N, &config).unwrap();
-            let (mut later, mut earlier) = (search.new_spectrum(), search.new_spectrum());
-            let view = |raster| ArrayView2::from_shape((N, N), raster).unwrap();
-            search.spectrum(view(&f), &mut later).unwrap();
-            search.spectrum(view(&g), &mut earlier).unwrap();
-            search.search(&later, &earlier, None).unwrap();
-            let (f, g) = (rings(&mut search, &f), rings(&mut search, &g));
-            for m in 0..angles {
-                prop_assert!((search.at(m as isize) - direct(&f, &g, m)).abs() < 1e-4, "{m}");
-            }
-        }
     }
 }

@@ -92,6 +92,16 @@ fn every_form_of_the_search_finds_the_motion() {
             dx.abs() < metres && dy.abs() < metres && dyaw.abs() < degrees,
             "{name}: {dx} {dy} {dyaw}"
         );
+        // Scores are correlation coefficients, exact where a parabola goes through the highest one.
+        let (same, _) = pair(255, 0.4, motion, 3);
+        let (angle, shift) = search(255, 0.4, &configs, &same, &same);
+        let is_one = |score: f64| (score - 1.0).abs() < 1e-3;
+        assert!(
+            angle.angle_rad.abs() < 1e-4 && is_one(angle.score),
+            "{name}"
+        );
+        let is_exact = configs.1.peak == Peak::Parabola;
+        assert!(!is_exact || is_one(shift.score), "{name}: {shift:?}");
     }
 }
 
