@@ -84,19 +84,3 @@ impl AngleGrid {
         (0.5 * self.step * self.count as f64).powi(2) / 3.0
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_default_has_thirty_one_angles_zero_among_them() {
-        let grid = ExhaustiveConfig::default().angles();
-        assert_eq!(grid.count, 31);
-        assert!(
-            (grid.angle(0.0).to_degrees() + 15.0).abs() < 1e-9 && grid.angle(15.0).abs() < 1e-9
-        );
-        assert!(!grid.is_inner(0) && grid.is_inner(1) && !grid.is_inner(30));
-        assert_eq!((grid.beside(30, 2), grid.beside(0, -1)), (30, 0));
-    }
-}

@@ -145,20 +145,3 @@ fn only_power_above_the_floor_counts() {
         .unwrap();
     assert!(floored.iter().all(|&power| power == 0.0));
 }
-
-#[test]
-fn cells_beyond_the_last_bin_and_below_the_minimum_range_are_zero() {
-    let config = config(255, Sampling::Averaged);
-    let mut scan = noise(0.0438, 1500); // to 65.4 m
-    scan.bytes.fill(200);
-    let raster = raster(&config, &scan, None);
-    for (cell, &power) in raster.iter().enumerate() {
-        let range_m = centre_m(&config, cell / 255, cell % 255).coords.norm();
-        if !(1.999..66.0).contains(&range_m) {
-            assert_eq!(power, 0.0, "at {range_m} m");
-        }
-        if (2.001..64.8).contains(&range_m) {
-            assert!((power - 200.0).abs() < 0.01, "{power} at {range_m} m");
-        }
-    }
-}
