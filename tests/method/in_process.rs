@@ -76,14 +76,6 @@ fn on_the_demo() {
 }
 
 #[test]
-fn on_real_scans() {
-    if let Some(data) = real_data("radiate-2019-02-12") {
-        let run = configuration("radiate.toml").data(&data);
-        assert_eq!(assert_same_bits(&run.set("source.scans=80")), 80);
-    }
-}
-
-#[test]
 fn with_the_gyro_of_a_real_drive() {
     if let Some(data) = real_data("radiate-2019-02-12") {
         let log = data.join("imu_as_logged.csv");
