@@ -63,7 +63,7 @@ pub fn assert_same_bits(run: &Run) -> usize {
     poses.len()
 }
 
-fn configuration(name: &str) -> Run {
+pub fn configuration(name: &str) -> Run {
     Run::of_file(&Path::new(crate::PROJECT).join("configs").join(name))
 }
 
