@@ -1,7 +1,7 @@
 //! Real scans (`GYRE_DATA`) through the whole pipeline, with the accuracy that is to be kept.
 
 use crate::{
-    common::{Run, odometry, real_data},
+    common::{odometry, real_data},
     method::in_process::configuration,
 };
 

@@ -21,8 +21,7 @@ use clap::{Args, ValueEnum, builder::PossibleValue};
 use gyre_datasets::{Dataset, DatasetOptions};
 use gyre_geometry::OwnedScan;
 use gyre_configuration::terminal::{Failure, print};
-use gyre_slam::mapping::encode_png;
-use png::ColorType;
+use gyre_tools::masks::picture::write_grey;
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -157,9 +156,7 @@ impl CorruptArguments {
             scan.bytes = (0..geometry.bins).flat_map(column).collect();
         }
         let file = folder.join(dataset.file(index).file_name().unwrap_or_default());
-        let width = dataset.image_size().width;
-        let picture = encode_png(width, ColorType::Grayscale, &scan.bytes)?;
-        fs::write(&file, picture).map_err(cannot_write(&file))
+        write_grey(&file, dataset.image_size().width, &scan.bytes)
     }
 }
 

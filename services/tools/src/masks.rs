@@ -3,6 +3,7 @@
 mod drawing;
 mod inspection;
 mod inspector;
+pub mod picture;
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
