@@ -2,7 +2,6 @@
 
 mod arguments;
 mod extend;
-pub mod keyframes;
 pub mod placing;
 
 use std::{
@@ -21,6 +20,7 @@ use gyre_radar::Trajectory;
 use gyre_results::{Content, Out, georeference, map_options, require_results};
 use gyre_slam::{
     Keyframe, RecordReader,
+    localisation::Map,
     mapping::{
         Drawing, Evidence, MapOptions, Origin, TileSource, write_geotiff, write_pgm,
         write_web_tiles,
@@ -74,8 +74,8 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     }
     let (out, origin) = (&arguments.out, origin(arguments)?);
     if arguments.format.contains(&MapFormat::Folder) {
-        let placed = keyframes::placed(&mut keyframes, &poses)?;
-        folder::write(out, &placed, drawing.evidence(), origin)?;
+        let kept = placed(&mut keyframes, &poses)?;
+        folder::write(out, &kept, drawing.evidence(), origin)?;
     }
     export(arguments, origin, &mut drawing, &lines)?;
     Ok(drawing)
@@ -95,6 +95,19 @@ pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Fa
         }
     }
     Ok(evidence)
+}
+
+/// Returns the keyframes that have a pose, with their poses in the frame of the first one.
+pub fn placed(keyframes: &mut RecordReader<Keyframe>, poses: &Trajectory) -> Result<Map, Failure> {
+    let (mut kept, mut first): (_, Option<Pose>) = (Vec::new(), None);
+    for index in 0..keyframes.len() {
+        let mut keyframe = keyframes.read(index)?;
+        if let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) {
+            keyframe.pose.motion = first.get_or_insert(pose).inv_mul(&pose);
+            kept.push(keyframe);
+        }
+    }
+    Ok(Map::new(kept)?)
 }
 
 /// Returns the place of the map on the earth: the given place, else the place of the run by GNSS.
@@ -206,7 +219,7 @@ mod tests {
     use clap::ValueEnum;
     use gyre_datasets::ground_truth::write_tum_pose;
     use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
-    use gyre_slam::{RecordLog, mapping::Map};
+    use gyre_slam::{RecordLog, localisation, mapping::Map};
 
     use super::*;
 
@@ -282,7 +295,7 @@ mod tests {
         let out = folder.path().join("map");
         let opened = Map::open(&out).unwrap();
         assert_eq!(opened.keyframes(), 3);
-        let kept = gyre_slam::localisation::Map::open(&out).unwrap();
+        let kept = localisation::Map::open(&out).unwrap();
         assert_eq!(kept.keyframes().len(), 3);
         assert_eq!(kept.pose(2).translation.x, 6.0);
         let options = opened.options();
@@ -304,7 +317,7 @@ mod tests {
         let refused = map(&arguments(folder.path())).unwrap_err().to_string();
         assert!(refused.contains("holiday.jpg is no tile"), "{refused}");
         assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
-        let kept = gyre_slam::localisation::Map::open(&out).unwrap();
+        let kept = localisation::Map::open(&out).unwrap();
         assert_eq!(kept.keyframes().len(), 3);
         // The corrected trajectory comes before the trajectory of odometry.
         fs::remove_file(out.join("tiles/holiday.jpg")).unwrap();
