@@ -1,31 +1,13 @@
 //! `gyre run` as a whole: six processes, the same result every time, whatever interrupts it.
 
-use std::{collections::BTreeSet, process::Command};
+use std::process::Command;
 
 use crate::common::{
-    Run, STAGES, leftovers, odometry, processes,
+    Run, STAGES, odometry,
     recording::{self, MIDDLE, MODERATE},
     undisturbed,
 };
 use rustix::process::Signal;
-
-#[test]
-fn six_processes_of_their_own_are_there_while_it_runs() {
-    let run = Run::of_recording().rate(MODERATE);
-    let mut running = run.start();
-    let stages = running.await_stages();
-    assert_eq!(
-        stages.keys().map(String::as_str).collect::<BTreeSet<_>>(),
-        BTreeSet::from(STAGES)
-    );
-    let pids: BTreeSet<_> = stages.values().copied().chain([running.pid()]).collect();
-    assert_eq!(pids.len(), STAGES.len() + 1, "{stages:?}");
-    for pid in stages.into_values() {
-        // Its place is named after --out.
-        assert_eq!(processes::run_of(pid), Some(leftovers::root(run.out())));
-    }
-    running.finish().succeeded();
-}
 
 #[test]
 fn all_results_are_there_and_account_for_every_scan() {
@@ -104,20 +86,6 @@ fn an_interrupted_run_names_how_it_is_resumed_and_resumes_at_another_rate_and_wi
     let run = run.set("run.window=2");
     assert_eq!(run.complete(), undisturbed());
     assert!(run.summary()["resumed_after"].as_u64() >= Some(processed));
-}
-
-#[test]
-fn two_runs_at_once_do_not_disturb_each_other() {
-    let runs = [
-        Run::of_recording().rate(MODERATE),
-        Run::of_recording().set("masking.kind=none"),
-    ];
-    let alone = runs[1].complete();
-    let [slow, fast] = runs.each_ref().map(Run::start);
-    fast.finish().succeeded();
-    slow.finish().succeeded();
-    assert_eq!(runs[0].odometry(), undisturbed());
-    assert_eq!(runs[1].odometry(), alone);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 mod drives;
 
 use std::{
-    fs,
+    env, fs,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     thread,
@@ -14,10 +14,14 @@ use std::{
 use gyre_journal as journal;
 use rustix::process::{Pid, Signal, kill_process_group};
 
-pub(crate) use drives::Drives;
+use drives::Drives;
 
-use crate::common::{
-    Ended, assert_nothing_left, gyre, leftovers, poses_of, processes, recording, send, with_tmpfs,
+use crate::{
+    PROGRAM, PROJECT,
+    common::{
+        Ended, assert_nothing_left, gyre, leftovers, poses_of, processes, recording, send,
+        with_tmpfs,
+    },
 };
 
 /// A batch takes seconds, far more only on a loaded machine.
@@ -233,19 +237,34 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     let before = "had been computed before";
     assert!(last.contains(said) && last.contains(before), "{last}");
     assert_eq!(killed.table(), calm.table());
+}
 
-    // Tasks that share the list and the folder alone.
-    let shared = drives.batch("shared").with(&paced[..2]);
-    let task = |task: &str| shared.clone().with(&["--task", task, "--tasks", "3"]);
-    let tasks = ["0", "1", "2"].map(task);
-    let started: Vec<_> = tasks.iter().map(Batch::start).collect();
-    let codes: Vec<_> = started.into_iter().map(Started::wait).collect();
-    // Of the third share, part-24 and empty, one fails as well.
-    assert_eq!(codes, [Some(1), Some(1), Some(1)]);
-    let ended = shared.clone().with(&["--collect"]).finish();
-    assert_eq!(ended.code(), Some(1));
-    assert_eq!(ended.stderr.lines().count(), 5, "{}", ended.stderr);
-    assert_eq!(shared.table(), calm.table());
+/// What an array of Slurm executes.
+#[test]
+fn tasks_that_share_the_list_and_the_folder_alone_give_the_same_table() {
+    let drives = Drives::new().recordings(&[4, 5, 6]);
+    let nowhere = drives.path("nowhere");
+    let drives = drives.line("missing", &nowhere, "");
+    let [alone, shared] = ["alone", "shared"].map(|out| drives.batch(out));
+    assert_eq!(alone.finish().code(), Some(1));
+    let programs = Path::new(PROGRAM).parent().unwrap();
+    let path = format!("{}:{}", programs.display(), env::var("PATH").unwrap());
+    let task = |task: &str| {
+        let mut script = Command::new("bash");
+        script.arg(format!("{PROJECT}/examples/slurm/gyre.sbatch"));
+        script.arg(drives.path("list.csv")).arg(&shared.out);
+        script.arg("--config").arg(drives.path("small.toml"));
+        script.env("PATH", &path).env("SLURM_ARRAY_TASK_ID", task);
+        script.env("TASKS", "2").spawn().unwrap()
+    };
+    let tasks = ["0", "1"].map(task);
+    let codes = tasks.map(|mut task| task.wait().unwrap().code());
+    // The second one has the drive that is missing.
+    assert_eq!(codes, [Some(0), Some(1)]);
+    let collected = shared.clone().with(&["--collect"]).finish();
+    assert_eq!(collected.code(), Some(1));
+    assert_eq!(collected.stderr.lines().count(), 1, "{}", collected.stderr);
+    assert_eq!(shared.table(), alone.table());
 }
 
 #[test]

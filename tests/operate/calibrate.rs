@@ -26,6 +26,15 @@ fn calibrate(recording: &Path, out: &Path, set: &[&str], words: &[&str]) -> Ende
     Ended::of(command)
 }
 
+/// Reads a drive with too long ranges; returns what is printed, and the right offset.
+fn wrongly_read(out: &Path, words: &[&str]) -> (String, f64) {
+    let recording = recording::around_a_block();
+    let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());
+    let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
+    let ended = calibrate(recording, out, &[&wrong, FEW, NEAR], words);
+    (ended.succeeded().stdout.clone(), right_m)
+}
+
 /// The range offset of a `dataset.toml`, or of a section `[dataset]`.
 fn range_offset_m(settings: &str) -> f64 {
     let table: toml::Table = settings.parse().unwrap();
@@ -39,10 +48,7 @@ fn range_offset_m(settings: &str) -> f64 {
 fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();
-    let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());
-    let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
-    let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR], &[]);
-    let said = ended.succeeded().stdout.clone();
+    let (said, right_m) = wrongly_read(out.path(), &[]);
     let line = |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap();
     for (name, end) in [
         ("range offset", "CONTRADICTS the configured value"),
@@ -83,11 +89,8 @@ fn offset_of(block: &str) -> [f64; 2] {
 fn two_drives_determine_a_radar_better_than_one() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();
-    let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());
-    let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
     let with = ["--with", recording.to_str().unwrap()];
-    let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR], &with);
-    let said = ended.succeeded().stdout.clone();
+    let (said, _) = wrongly_read(out.path(), &with);
     let (each, together) = said.split_once("all together: ").unwrap();
     let [alone, both] = [each, together].map(offset_of);
     assert!((both[0] - alone[0]).abs() < 1e-3, "{said}");

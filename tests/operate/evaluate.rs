@@ -2,13 +2,18 @@
 //! a table, as JSON and drawn.
 
 use std::{
+    env,
     ffi::OsStr,
     fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
-use crate::common::{Ended, Run, finished, gyre, python, recording};
+use crate::{
+    PROGRAM, PROJECT,
+    common::{Ended, Run, can, finished, gyre, python, recording},
+    reach::only_if,
+};
 use serde_json::Value;
 
 /// A run of the small recording that is over.
@@ -45,47 +50,34 @@ fn figure(value: &Value) -> f64 {
         .unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
-/// The figure of a statistic that a program of evo prints.
-fn evo(program: &str, run: &Run, options: &[&str]) -> Option<f64> {
-    let python = PathBuf::from(python());
-    let program = python.with_file_name(program);
-    let truth = run.out().join("ground_truth.tum");
-    let mut command = Command::new(program);
-    // evo writes its settings and logs into the home folder.
-    command.env("HOME", run.folder()).arg("tum").arg(truth);
-    command.arg(run.out().join("trajectory.tum")).args(options);
-    if command.output().is_err() {
-        println!("skipped: evo is not beside the Python that GYRE_PYTHON names");
-        return None;
-    }
-    let printed = Ended::of(command).succeeded().stdout.clone();
-    let mut lines = printed.lines();
-    let rmse = lines.find_map(|line| line.trim().strip_prefix("rmse"));
-    Some(rmse.unwrap().trim().parse().unwrap())
-}
-
 #[test]
 #[ignore = ".ci/nightly: evo starts slowly, and often"]
 fn evo_finds_the_same_errors_to_the_digit_it_shows() {
+    let evo = PathBuf::from(python()).with_file_name("evo_ape");
+    only_if!(can(&[evo.to_str().unwrap(), "--help"]));
     let simulation = "[simulation]\nscans = 24\n[raster]\nn = 127\ncell_m = 0.8\n";
     let run = Run::configured(simulation);
     run.complete();
+    let mut script = Command::new(format!("{PROJECT}/examples/evo.sh"));
+    let [evo, own] = [evo.as_path(), Path::new(PROGRAM)].map(|it| it.parent().unwrap().display());
+    let path = format!("{evo}:{own}:{}", env::var("PATH").unwrap());
+    // evo writes its settings and logs into the home folder.
+    script
+        .arg(run.out())
+        .env("PATH", path)
+        .env("HOME", run.folder());
+    let printed = Ended::of(script).succeeded().stdout.clone();
+    let rmse = printed
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("rmse"));
+    let theirs: Vec<f64> = rmse.take(3).map(|it| it.trim().parse().unwrap()).collect();
     let evaluation = &run.summary()["evaluation"];
-    let pairs = ["--delta", "1", "--delta_unit", "f", "--pose_relation"];
-    let translation = [&pairs[..], &["trans_part"]].concat();
-    let rotation = [&pairs[..], &["angle_deg"]].concat();
-    let (ate, rpe) = (&evaluation["ate"], &evaluation["rpe"]);
-    for (program, options, ours) in [
-        ("evo_ape", vec!["--align"], &ate["rmse_m"]),
-        ("evo_rpe", translation, &rpe["translation_rmse_m"]),
-        ("evo_rpe", rotation, &rpe["rotation_rmse_deg"]),
-    ] {
-        let Some(theirs) = evo(program, &run, &options) else {
-            return;
-        };
+    let (ate, rpe) = (&evaluation["ate"]["rmse_m"], &evaluation["rpe"]);
+    let ours = [ate, &rpe["translation_rmse_m"], &rpe["rotation_rmse_deg"]].map(figure);
+    assert_eq!(theirs.len(), ours.len(), "{printed}");
+    for (theirs, ours) in theirs.iter().zip(ours) {
         // Six digits are shown, and stamps and poses in files are rounded.
-        let ours = figure(ours);
-        assert!((theirs - ours).abs() < 2e-6, "{program}: {theirs}, {ours}");
+        assert!((theirs - ours).abs() < 2e-6, "{theirs}, {ours}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! Operation: commands, services, swaps, load, and the machine that a run is on.
 
-pub mod batch;
+mod batch;
 mod calibrate;
 pub mod commands;
 mod doctor;
@@ -9,7 +9,6 @@ mod front_door;
 mod places;
 mod resources;
 mod scheduling;
-mod slurm;
 mod stress;
 mod swap;
 mod systemd;

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::common::{Run, STAGES, cpu_time, recording, send, undisturbed};
+use crate::common::{Run, STAGES, cpu_time, leftovers, processes, recording, send, undisturbed};
 use rustix::process::Signal;
 
 #[test]
@@ -30,6 +30,10 @@ fn an_idle_pipeline_uses_no_time_and_goes_on_afterwards() {
     let run = Run::of_recording().rate("6");
     let mut running = run.start();
     let stages = running.await_stages();
+    assert_eq!(stages.len(), STAGES.len(), "{stages:?}");
+    // Their place is named after --out.
+    let root = Some(leftovers::root(run.out()));
+    assert!(stages.values().all(|pid| processes::run_of(*pid) == root));
     let source = stages["radar-replay"];
     running.await_poses(recording::SCANS / 3);
     send(source, Signal::STOP);

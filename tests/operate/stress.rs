@@ -14,7 +14,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{Ended, assert_nothing_left, folder, gyre, recording, send, wrapped};
+use crate::common::{Ended, assert_nothing_left, folder, gyre, install, recording, send, wrapped};
 
 /// Time between two scans of the recording, s.
 const PERIOD_S: f64 = 0.25;
@@ -44,16 +44,17 @@ impl Stress {
         self.folder.path().join("out")
     }
 
-    fn run(&self, words: &[&str]) -> Ended {
+    /// Runs it with words that spaces part.
+    fn run(&self, words: &str) -> Ended {
         self.start(words).join().unwrap()
     }
 
     /// Starts it; its end must come.
-    fn start(&self, words: &[&str]) -> JoinHandle<Ended> {
+    fn start(&self, words: &str) -> JoinHandle<Ended> {
         let mut command = gyre();
         command.arg("stress");
         command.arg(self.folder.path().join("small.toml"));
-        command.arg("--out").arg(self.out()).args(words);
+        command.arg("--out").arg(self.out()).args(words.split(' '));
         let command = wrapped(&["timeout", "120"], &command);
         thread::spawn(|| Ended::of(command))
     }
@@ -74,7 +75,7 @@ impl Stress {
     }
 
     /// Asserts that the test was not carried out, and printed these words.
-    fn is_not_carried_out(&self, words: &[&str], said: &[&str]) {
+    fn is_not_carried_out(&self, words: &str, said: &[&str]) {
         let ended = self.run(words);
         assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
         let printed = ended.stdout + &ended.stderr;
@@ -99,9 +100,8 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn a_generous_budget_is_kept_and_an_impossible_one_is_named() {
     let stress = Stress::new();
-    let steady = ["--scenario", "steady", "--duration", "3"];
-    let kept = [&steady[..], &["--set", "budget.max_ms=60000"]].concat();
-    stress.run(&kept).succeeded();
+    let steady = |budget| format!("--scenario steady --duration 3 --set budget.{budget}");
+    stress.run(&steady("max_ms=60000")).succeeded();
     assert!(stress.out().join("config.toml").exists());
     let outcome = stress.outcome();
     assert_eq!(outcome["verdict"], "passed");
@@ -109,8 +109,7 @@ fn a_generous_budget_is_kept_and_an_impossible_one_is_named() {
     assert_eq!(counts["due"], 12, "{counts}");
     let processes = outcome["figures"]["processes"].as_array().unwrap();
     assert!(processes.iter().any(|cost| cost["name"] == "masking"));
-    let missed = [&steady[..], &["--set", "budget.steady.p50_ms=0.001"]].concat();
-    let said = failed(stress.run(&missed));
+    let said = failed(stress.run(&steady("steady.p50_ms=0.001")));
     assert!(said.contains("steady: FAILED; p50_ms"), "{said}");
     assert!(said.contains("limit 0.001"), "{said}");
     stress.assert_nothing_left("steady");
@@ -119,9 +118,8 @@ fn a_generous_budget_is_kept_and_an_impossible_one_is_named() {
 #[test]
 fn the_sensors_clock_goes_on_while_its_source_is_dead() {
     let stress = Stress::new();
-    let words = ["--scenario", "kills", "--stage", "radar-replay"];
-    let words = [&words[..], &["--duration", "6"]].concat();
-    stress.run(&words).succeeded();
+    let words = "--scenario kills --stage radar-replay --duration 6";
+    stress.run(words).succeeded();
     let figures = &stress.outcome()["figures"];
     let summary = fs::read_to_string(stress.run_out("kills").join("summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
@@ -135,47 +133,51 @@ fn the_sensors_clock_goes_on_while_its_source_is_dead() {
 #[test]
 fn a_test_that_cannot_be_carried_out_is_no_verdict() {
     let stress = Stress::new();
-    let nowhere = ["nowhere", "--scenario", "steady"];
-    stress.is_not_carried_out(&nowhere, &["gyre stress: ", "nowhere"]);
-    let misspelt = ["--set", "budget.stedy.p50_ms=1", "--scenario", "steady"];
-    stress.is_not_carried_out(&misspelt, &["did you mean `steady`?"]);
-    let short = [
-        "--scenario",
-        "kills",
-        "--duration",
-        "3",
-        "--set",
-        "budget.recovery_ms=1",
-    ];
-    let said = ["kills: NOT CARRIED OUT", "needs --duration 5 or more"];
-    stress.is_not_carried_out(&short, &said);
-    let no_place = ["--scenario", "steady", "--set", "run.observers=0"];
-    stress.is_not_carried_out(&no_place, &["set run.observers to 1 or more"]);
-    stress.assert_nothing_left("steady");
-    for (scenario, lacking) in [
-        ("gyro-out", "needs a gyro, and gyro.kind is none"),
-        ("wheels-slip", "needs wheels, and wheels.kind is none"),
-        ("radar-blind", "needs a gyro or wheels"),
+    let remedy = "simulation.gyro.profile";
+    for (words, said) in [
+        ("nowhere --scenario steady", ["gyre stress: ", "nowhere"]),
+        (
+            "--set budget.stedy.p50_ms=1 --scenario steady",
+            ["", "did you mean `steady`?"],
+        ),
+        (
+            "--scenario kills --duration 3 --set budget.recovery_ms=1",
+            ["kills: NOT CARRIED OUT", "needs --duration 5 or more"],
+        ),
+        (
+            "--scenario steady --set run.observers=0",
+            ["", "set run.observers to 1 or more"],
+        ),
+        (
+            "--scenario gyro-out",
+            ["needs a gyro, and gyro.kind is none", remedy],
+        ),
+        (
+            "--scenario wheels-slip",
+            ["needs wheels, and wheels.kind is none", remedy],
+        ),
+        ("--scenario radar-blind", ["needs a gyro or wheels", remedy]),
     ] {
-        let said = [lacking, "simulation.gyro.profile"];
-        stress.is_not_carried_out(&["--scenario", scenario], &said);
+        stress.is_not_carried_out(words, &said);
     }
+    stress.assert_nothing_left("steady");
     let stress = Stress::of(&with_gyro_and_wheels());
-    let blind = [&["--scenario", "radar-blind"][..], &BOTH].concat();
+    let blind = format!("--scenario radar-blind {BOTH}");
     stress.is_not_carried_out(&blind, &["the recording lasts 15 s"]);
 }
 
 #[test]
 fn a_stage_behind_a_shell_is_measured_and_stopped_with_all_that_it_has_started() {
     let stress = Stress::new();
-    let program = crate::PROGRAM;
     // The shell stays, and its name differs from the stage's.
-    let command = format!(
-        "stages.masking.command=['sh', '-c', '\"$0\" stage masking; exit $?', '{program}']"
-    );
-    let stopped = ["--scenario", "stopped", "--stage", "masking"];
-    let words = [&stopped[..], &["--duration", "6", "--set", &command]].concat();
-    stress.run(&words).succeeded();
+    let shell = stress.folder.path().join("shell.sh");
+    let script = format!("#!/bin/sh\n{} stage masking\nexit $?\n", crate::PROGRAM);
+    install(&shell, script);
+    let command = format!("stages.masking.command=['{}']", shell.display());
+    let stopped = "--scenario stopped --stage masking --duration 6";
+    stress
+        .run(&format!("{stopped} --set {command}"))
+        .succeeded();
     let outcome = stress.outcome();
     assert_eq!(outcome["verdict"], "passed");
     let figures = &outcome["figures"];
@@ -192,9 +194,8 @@ fn a_stage_behind_a_shell_is_measured_and_stopped_with_all_that_it_has_started()
 #[test]
 fn stages_that_are_slow_are_not_judged_without_a_limit() {
     let stress = Stress::new();
-    let stages = ["--stage", "masking", "--stage", "refinement"];
-    let slow = ["--scenario", "slow-stage", "--duration", "2"];
-    stress.run(&[&slow[..], &stages].concat()).succeeded();
+    let slow = "--scenario slow-stage --duration 2 --stage masking --stage refinement";
+    stress.run(slow).succeeded();
     assert_eq!(stress.outcome()["verdict"], "not-judged");
     let run = fs::read_to_string(stress.run_out("slow-stage").join("config.toml")).unwrap();
     assert_eq!(run.matches("delay_ms = 300").count(), 2, "{run}");
@@ -213,8 +214,7 @@ fn await_measurement(out: &Path) {
 #[test]
 fn what_a_killed_run_has_left_is_not_measured() {
     let stress = Stress::new();
-    let steady = ["--scenario", "steady", "--scenario", "steady"];
-    let measured = stress.start(&[&steady[..], &["--duration", "6"]].concat());
+    let measured = stress.start("--scenario steady --scenario steady --duration 6");
     let out = stress.run_out("steady");
     await_measurement(&out);
     // Its files in shared memory stay, where the next run has its own.
@@ -238,27 +238,16 @@ fn with_gyro_and_wheels() -> PathBuf {
     recording::configured("stressed-gyro-and-wheels", settings)
 }
 
-const BOTH: [&str; 4] = ["--set", "gyro.kind=auto", "--set", "wheels.kind=auto"];
+const BOTH: &str = "--set gyro.kind=auto --set wheels.kind=auto";
 
 #[test]
 #[ignore = ".ci/nightly: 25 s, two runs at the pace of a radar"]
 fn a_gyro_that_drops_out_is_noticed_and_a_recovery_that_takes_too_long_fails() {
     let stress = Stress::of(&with_gyro_and_wheels());
-    let mut words = BOTH.to_vec();
-    words.extend([
-        "--quick",
-        "--scenario",
-        "gyro-out",
-        "--scenario",
-        "wheels-slip",
-    ]);
-    for budget in [
-        "budget.gyro-out.degraded_percent=0",
-        "budget.gyro-out.recovery_ms=5000",
-        "budget.wheels-slip.recovery_ms=1",
-    ] {
-        words.extend(["--set", budget]);
-    }
+    let budgets = "--set budget.gyro-out.degraded_percent=0 \
+        --set budget.gyro-out.recovery_ms=5000 --set budget.wheels-slip.recovery_ms=1";
+    let scenarios = "--scenario gyro-out --scenario wheels-slip";
+    let words = format!("--quick {BOTH} {scenarios} {budgets}");
     let said = failed(stress.run(&words));
     let outcomes = stress.outcomes();
     let [out, slip] = [0, 1].map(|index| &outcomes[index]);

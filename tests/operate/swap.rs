@@ -154,9 +154,7 @@ fn a_swap_without_a_scan_to_try_the_program_says_so_with_a_code_of_its_own() {
 #[test]
 fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
     let (run, running) = started();
-    let mut words = gyre();
-    words.args(["swap", "masking", "--command", "sleep 60"]);
-    let mut client = words.arg(run.out()).spawn().unwrap();
+    let mut client = swapping(&run, &[]);
     thread::sleep(Duration::from_millis(200));
     client.kill().unwrap();
     client.wait().unwrap();

@@ -1,10 +1,10 @@
-//! The unit of systemd: its settings are known to systemd, and it starts a command that there is.
+//! The unit of systemd: its settings are known to systemd.
 
 use std::{fs, path::Path, process::Command};
 
 use crate::{
     PROJECT,
-    common::{can, folder, gyre},
+    common::{can, folder},
     reach::only_if,
 };
 
@@ -31,13 +31,4 @@ fn systemd_accepts_the_unit() {
     assert!(verified.status.success() && said.is_empty(), "{said}");
     let misspelt = verify(&unit.replace("WatchdogSec", "WatchdogSecs"));
     assert!(!misspelt.status.success(), "it would not notice a mistake");
-}
-
-#[test]
-fn the_unit_s_command_is_one_that_gyre_has() {
-    let unit = fs::read_to_string(Path::new(PROJECT).join(UNIT)).unwrap();
-    let command = unit.lines().find_map(|it| it.strip_prefix("ExecStart="));
-    let words: Vec<&str> = command.unwrap().split(' ').skip(1).collect();
-    let parsed = gyre().args(words).arg("--help").output().unwrap();
-    assert!(parsed.status.success(), "{parsed:?}");
 }

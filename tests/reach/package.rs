@@ -72,7 +72,10 @@ fn the_debian_package_has_what_its_unit_and_its_configurations_name() {
     let unit = fs::read_to_string(Path::new(PROJECT).join("configs/systemd/gyre@.service"));
     let unit = unit.unwrap();
     let of = |key: &str| unit.lines().find_map(|line| line.strip_prefix(key));
-    assert!(has(of("ExecStart=").unwrap().split(' ').next().unwrap()));
+    let mut command = of("ExecStart=").unwrap().split(' ');
+    assert!(has(command.next().unwrap()));
+    let parsed = gyre().args(command).arg("--help").output().unwrap();
+    assert!(parsed.status.success(), "{parsed:?}");
     assert!(has(of("Documentation=file://").unwrap()));
     let folder = of("WorkingDirectory=-").unwrap();
     let demo = fs::read_to_string(Path::new(PROJECT).join("configs/demo.toml"));

@@ -24,7 +24,6 @@ use crate::{
 };
 
 pub use arguments::EvaluateArguments;
-pub use objects::rows;
 
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     if arguments.objects {

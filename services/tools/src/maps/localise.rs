@@ -12,7 +12,7 @@ use std::{
 };
 
 use clap::Args;
-use counts::Counts;
+use counts::{Counts, Located};
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, inputs::Inputs, print},
@@ -85,15 +85,15 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
         &mut found,
         &configuration,
     );
-    let counts = &found.counts;
-    let searched = counts.scans() + PROBES * usize::from(!scans.played.is_empty());
+    let searched = found.scans.len() + PROBES * usize::from(!scans.played.is_empty());
     let ms_a_scan = started.elapsed().as_secs_f64() * 1e3 / searched.max(1) as f64;
     fixes.commit()?;
     let drawn = draw(&arguments.map, &found, out);
     ended?;
     drawn?;
+    let counts = Counts::of(&found.scans);
     let figures = Figures {
-        counts,
+        counts: &counts,
         left_out: scans.left_out,
         ms_a_scan,
         fixes: out.join(FIXES),
@@ -105,7 +105,7 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
         let fixes = figures.fixes.display();
         print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
     }
-    match counts.has_fix() {
+    match found.has_fix() {
         true => Ok(ExitCode::SUCCESS),
         false => {
             let (data, map) = (configuration.data(), arguments.map.display());
@@ -116,16 +116,21 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
 
 #[derive(Default)]
 struct Found {
-    counts: Counts,
+    scans: Vec<Located>,
+    /// The times of those with a fix.
     stamps_ns: Vec<i64>,
     /// Their poses, in pieces with a fix for each scan; the last may be empty.
     pieces: Vec<Vec<Pose>>,
 }
 
 impl Found {
+    fn has_fix(&self) -> bool {
+        !self.stamps_ns.is_empty()
+    }
+
     fn add(&mut self, scan: &RegisteredScan<'_>, found: &Localisation) {
         let stamp_ns = scan.observation.stamp_ns;
-        self.counts.add(scan.number, stamp_ns, found.status);
+        self.scans.push((scan.number, stamp_ns, found.status));
         let is_fix = matches!(found.status, Status::Found | Status::Tracked);
         match (&found.fix, self.pieces.last_mut()) {
             (Some(fix), Some(piece)) if is_fix => {
@@ -159,10 +164,9 @@ fn follow(
         write_row(&scan, &found, localiser.map(), &mut row);
         fixes.append(&row)?;
         all.add(&scan, &found);
-        let counts = &all.counts;
-        let done = counts.scans() as u64;
+        let done = all.scans.len() as u64;
         progress.scans(done, done, status_name(found.status).to_owned());
-        if counts.scans() == FIRST && !counts.has_fix() && !scans.played.is_empty() {
+        if all.scans.len() == FIRST && !all.has_fix() && !scans.played.is_empty() {
             let is_found = |it: &Observation<'_>| localiser.find(it.points, &it.twist).is_some();
             if !Scans::open(configuration)?.any_of(PROBES, is_found)? {
                 break;

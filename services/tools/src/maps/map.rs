@@ -2,8 +2,6 @@
 
 mod arguments;
 mod extend;
-pub mod keyframes;
-mod loops;
 pub mod placing;
 
 use std::{
@@ -22,6 +20,7 @@ use gyre_radar::Trajectory;
 use gyre_results::{Content, Out, georeference, map_options, require_results};
 use gyre_slam::{
     Keyframe, RecordReader,
+    localisation::Map,
     mapping::{
         Drawing, Evidence, MapOptions, Origin, TileSource, write_geotiff, write_pgm,
         write_web_tiles,
@@ -36,7 +35,6 @@ pub use arguments::{MapArguments, MapFormat};
 /// The corrected trajectory, and the trajectory of odometry.
 const CORRECTED: &str = "trajectory_slam.tum";
 const ODOMETRY: &str = "trajectory.tum";
-const LOOPS: &str = "loops.csv";
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
 /// asked for.
@@ -58,7 +56,7 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let given = arguments.trajectory.clone();
     let trajectory = given.unwrap_or_else(|| trajectory_of(&arguments.run));
     let poses = read_trajectory(&trajectory)?;
-    let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
+    let loops = placing::used_loops(&arguments.run)?;
     let configuration = configuration(&arguments.run)?;
     let _locked = Out::lock_for(&arguments.out, Content::MAP)?;
     let options = MapOptions {
@@ -76,8 +74,8 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     }
     let (out, origin) = (&arguments.out, origin(arguments)?);
     if arguments.format.contains(&MapFormat::Folder) {
-        let placed = keyframes::placed(&mut keyframes, &poses)?;
-        folder::write(out, &placed, drawing.evidence(), origin)?;
+        let kept = placed(&mut keyframes, &poses)?;
+        folder::write(out, &kept, drawing.evidence(), origin)?;
     }
     export(arguments, origin, &mut drawing, &lines)?;
     Ok(drawing)
@@ -97,6 +95,19 @@ pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Fa
         }
     }
     Ok(evidence)
+}
+
+/// Returns the keyframes that have a pose, with their poses in the frame of the first one.
+pub fn placed(keyframes: &mut RecordReader<Keyframe>, poses: &Trajectory) -> Result<Map, Failure> {
+    let (mut kept, mut first): (_, Option<Pose>) = (Vec::new(), None);
+    for index in 0..keyframes.len() {
+        let mut keyframe = keyframes.read(index)?;
+        if let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) {
+            keyframe.pose.motion = first.get_or_insert(pose).inv_mul(&pose);
+            kept.push(keyframe);
+        }
+    }
+    Ok(Map::new(kept)?)
 }
 
 /// Returns the place of the map on the earth: the given place, else the place of the run by GNSS.
@@ -144,26 +155,26 @@ struct Lines {
     loops: Vec<[Pose; 2]>,
 }
 
-/// Draws all keyframes that have a pose. `loops` are between scans.
+/// Draws all keyframes that have a pose. `loops` are between keyframes.
 fn draw(
     keyframes: &mut RecordReader<Keyframe>,
     poses: &Trajectory,
-    loops: &[[u64; 2]],
+    loops: &[[usize; 2]],
     drawing: &mut Drawing,
 ) -> Result<Lines, Failure> {
-    let (mut by_scan, mut span_ns) = (BTreeMap::new(), None);
+    let (mut placed, mut span_ns) = (BTreeMap::new(), None);
     for index in 0..keyframes.len() {
         let keyframe = keyframes.read(index)?;
         let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) else {
             continue;
         };
         drawing.draw(&keyframe, &pose)?;
-        by_scan.insert(keyframe.scan, pose);
+        placed.insert(index, pose);
         let (first_ns, _) = span_ns.unwrap_or((keyframe.stamp_ns, 0));
         span_ns = Some((first_ns, keyframe.stamp_ns));
     }
-    let end = |scan: u64| by_scan.get(&scan).copied();
-    let both = |&[from, to]: &[u64; 2]| Some([end(from)?, end(to)?]);
+    let end = |keyframe: usize| placed.get(&keyframe).copied();
+    let both = |&[from, to]: &[usize; 2]| Some([end(from)?, end(to)?]);
     Ok(Lines {
         trajectory: span_ns.map_or(Vec::new(), |span_ns| part(poses, span_ns)),
         loops: loops.iter().filter_map(both).collect(),
@@ -208,7 +219,7 @@ mod tests {
     use clap::ValueEnum;
     use gyre_datasets::ground_truth::write_tum_pose;
     use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
-    use gyre_slam::{RecordLog, mapping::Map};
+    use gyre_slam::{RecordLog, localisation, mapping::Map};
 
     use super::*;
 
@@ -266,6 +277,16 @@ mod tests {
         fs::write(folder.join("run/trajectory_slam.tum"), tum).unwrap();
     }
 
+    /// Writes the graph of the four keyframes, with an edge for each of these loops.
+    fn write_graph(folder: &Path, loops: &[[usize; 2]]) {
+        let vertices = (0..4).map(|k| format!("VERTEX_SE2 {k} {k} 0 0\n"));
+        let odometry = (1..4).map(|k| [k - 1, k]);
+        let edge = |[from, to]: [usize; 2]| format!("EDGE_SE2 {from} {to} 1 0 0 1 0 0 1 0 1\n");
+        let edges = odometry.chain(loops.iter().copied()).map(edge);
+        let graph: String = vertices.chain(edges).collect();
+        fs::write(folder.join("run/graph.g2o"), graph).unwrap();
+    }
+
     #[test]
     fn the_map_of_a_run_is_written_in_all_forms() {
         let folder = tempfile::tempdir().unwrap();
@@ -274,7 +295,7 @@ mod tests {
         let out = folder.path().join("map");
         let opened = Map::open(&out).unwrap();
         assert_eq!(opened.keyframes(), 3);
-        let kept = gyre_slam::localisation::Map::open(&out).unwrap();
+        let kept = localisation::Map::open(&out).unwrap();
         assert_eq!(kept.keyframes().len(), 3);
         assert_eq!(kept.pose(2).translation.x, 6.0);
         let options = opened.options();
@@ -296,7 +317,7 @@ mod tests {
         let refused = map(&arguments(folder.path())).unwrap_err().to_string();
         assert!(refused.contains("holiday.jpg is no tile"), "{refused}");
         assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
-        let kept = gyre_slam::localisation::Map::open(&out).unwrap();
+        let kept = localisation::Map::open(&out).unwrap();
         assert_eq!(kept.keyframes().len(), 3);
         // The corrected trajectory comes before the trajectory of odometry.
         fs::remove_file(out.join("tiles/holiday.jpg")).unwrap();
@@ -320,10 +341,7 @@ mod tests {
         assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
 
         // It is known before the search for places.
-        let vertices = (0..4).map(|k| format!("VERTEX_SE2 {k} {k} 0 0\n"));
-        let edges = (1..4).map(|k| format!("EDGE_SE2 {} {k} 1 0 0 1 0 0 1 0 1\n", k - 1));
-        let graph: String = vertices.chain(edges).collect();
-        fs::write(folder.path().join("run/graph.g2o"), graph).unwrap();
+        write_graph(folder.path(), &[]);
         let arguments = MapArguments {
             out: extended.clone(),
             extend: Some(out),
@@ -344,14 +362,10 @@ mod tests {
             fs::read(folder.path().join("map/map.png")).unwrap()
         };
         let plain = picture();
-        let loops = |verdict: &str| {
-            let rows = format!("scan,found_scan,verdict\n2,0,{verdict}\n3,0,used\n");
-            fs::write(folder.path().join("run/loops.csv"), rows).unwrap();
-        };
         // The last keyframe is not in the trajectory.
-        loops("ambiguous");
+        write_graph(folder.path(), &[[0, 3]]);
         assert!(picture() == plain);
-        loops("used");
+        write_graph(folder.path(), &[[0, 2], [0, 3]]);
         assert!(picture() != plain);
     }
 

@@ -5,7 +5,7 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_datasets::{Dataset, ScanSamples};
-use gyre_geometry::{LostAzimuths, OwnedScan, SparsePoint};
+use gyre_geometry::{LostAzimuths, OwnedScan, SparsePoint, Twist};
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_matching::{
     RefinementConfig, RefinementKind,
@@ -26,19 +26,22 @@ pub struct MaskInspector {
     odometry: Odometry,
     lag: usize,
     next: usize,
-    /// The last two registered scans, newest first.
-    last: [OwnedScan; 2],
-    /// Memory to read the next scan into.
-    spare: OwnedScan,
+    /// The last two registered scans, newest first, and memory to read the next one into.
+    last: [Registered; 3],
     samples: ScanSamples,
-    /// The velocities that the last two scans were compensated with.
-    twists: [Option<gyre_geometry::Twist>; 2],
-    lost: [LostAzimuths; 2],
     rows: PlacedRows,
     floor: u8,
     /// Maskers without any mask, and with the threshold alone.
     plain: [Masker; 2],
     points: Vec<SparsePoint>,
+}
+
+#[derive(Clone)]
+struct Registered {
+    scan: OwnedScan,
+    /// The velocity that it was compensated with.
+    twist: Option<Twist>,
+    lost: LostAzimuths,
 }
 
 impl MaskInspector {
@@ -63,16 +66,17 @@ impl MaskInspector {
             };
             Masker::new(&config.raster, &config.points, &masking)
         };
-        let scan = OwnedScan::with_limits(dataset.limits());
+        let last = Registered {
+            scan: OwnedScan::with_limits(dataset.limits()),
+            twist: None,
+            lost: LostAzimuths::default(),
+        };
         Ok(Self {
             odometry: Odometry::new(&config)?,
             lag: config.masking.feedback_lag(),
             next: configuration.source.played(dataset.scans()).start,
-            last: [scan.clone(), scan.clone()],
-            spare: scan,
+            last: [last.clone(), last.clone(), last],
             samples,
-            twists: [None; 2],
-            lost: [LostAzimuths::default(); 2],
             rows: PlacedRows::default(),
             floor,
             plain: [plain(MaskKind::None)?, plain(threshold)?],
@@ -101,26 +105,24 @@ impl MaskInspector {
 
     /// Registers a scan; false if it cannot be read and is left out, as in a run.
     fn register(&mut self, number: usize) -> Result<bool, Failure> {
-        match self.dataset.read(number, self.spare.slot()) {
-            Ok(geometry) => self.spare.geometry = geometry,
+        let next = &mut self.last[2];
+        match self.dataset.read(number, next.scan.slot()) {
+            Ok(geometry) => next.scan.geometry = geometry,
             Err(error) => {
                 print::note(format_args!("left out: {error}"));
                 return Ok(false);
             }
         }
-        let scan = self.spare.view();
+        let scan = next.scan.view();
         let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
         let registered = self.odometry.register(&scan, &samples);
         let registered = registered.map_err(|error| format!("scan {number}: {error}"))?;
-        self.last.swap(0, 1);
-        std::mem::swap(&mut self.last[0], &mut self.spare);
-        self.twists = [self.odometry.twist(), self.twists[0]];
-        self.lost = [self.odometry.lost_azimuths(), self.lost[0]];
+        next.twist = self.odometry.twist();
+        next.lost = self.odometry.lost_azimuths();
+        self.last.rotate_right(1);
         if registered.seq == 0 {
             // Where the chain starts a scan is its own scan before.
             self.last[1] = self.last[0].clone();
-            self.twists[1] = self.twists[0];
-            self.lost[1] = self.lost[0];
         }
         Ok(true)
     }
@@ -143,10 +145,11 @@ impl MaskInspector {
 
     /// The raster of the last scan (0) or the one before (1), without and with its mask.
     fn masked_raster(&mut self, scan: usize, masked: Array2<f32>) -> Result<MaskedRaster, Failure> {
+        let last = &self.last[scan];
         let sweep = Sweep {
             number: 0,
-            scan: self.rows.place(&self.last[scan].view(), &self.lost[scan]),
-            twist: self.twists[scan],
+            scan: self.rows.place(&last.scan.view(), &last.lost),
+            twist: last.twist,
         };
         let mut plain = [masked.clone(), masked.clone()];
         for (masker, raster) in self.plain.iter_mut().zip(&mut plain) {
@@ -174,7 +177,8 @@ impl MaskInspector {
     fn point_factors(&mut self) -> Result<Vec<([usize; 2], f32)>, Failure> {
         let twist = self.odometry.twist();
         let (masker, plain) = (&mut self.plain[1], &mut self.points);
-        let scan = self.rows.place(&self.last[0].view(), &self.lost[0]);
+        let last = &self.last[0];
+        let scan = self.rows.place(&last.scan.view(), &last.lost);
         let count = masker.points(&scan, twist, plain)?;
         let points = plain[..count].iter().zip(self.odometry.points());
         let factor = |(plain, weighed): (&SparsePoint, &SparsePoint)| {

@@ -30,16 +30,3 @@ pub fn svg(text: &str, what: &str) -> String {
     let text = text.find("<svg").map_or("", |start| &text[start..]);
     format!("<figure role=\"img\" aria-label=\"{what}\">{text}</figure>")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_of_a_file_is_no_markup_and_a_section_without_content_is_left_out() {
-        let name = escaped("<a href=\"x\">&");
-        assert_eq!(name, "&lt;a href=&quot;x&quot;&gt;&amp;");
-        assert_eq!(section("Map", ""), "");
-        assert!(section("Map", "x").contains("<h2>Map</h2>"));
-    }
-}

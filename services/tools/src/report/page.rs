@@ -269,7 +269,10 @@ mod tests {
     #[test]
     fn a_page_about_a_run_has_its_figures_its_picture_and_its_configuration() {
         let folder = tempfile::tempdir().unwrap();
-        let (a, truth) = (folder.path().join("<a>"), folder.path().join("truth.tum"));
+        let (a, truth) = (
+            folder.path().join("<\"a&>"),
+            folder.path().join("truth.tum"),
+        );
         fs::write(&truth, tum(0.0)).unwrap();
         run(&a, 0.0, "[run]\nmode = 'live'\n");
         fs::write(a.join("map.png"), [0x89, b'P', 0xff]).unwrap();
@@ -287,7 +290,8 @@ mod tests {
         ] {
             assert!(page.contains(part), "{part}");
         }
-        assert!(!page.contains("<a>") && page.contains("&lt;a&gt;"));
+        assert!(!page.contains("<\"a&>") && page.contains("&lt;&quot;a&amp;&gt;"));
+        assert!(page.contains("<h2>Map</h2>") && !page.contains("<h2>Errors</h2>"));
         assert!(!page.contains("src=\"http") && !page.contains("href="));
         fs::write(a.join("trajectory_slam.tum"), tum(4.0)).unwrap();
         let page = page_of(&[&a], &truth);

@@ -97,7 +97,7 @@ pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
 }
 
 /// Reads a table as CSV by the names of its columns.
-pub fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
+fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
     let rows: Result<Vec<T>, csv::Error> = table::open(path)?.deserialize().collect();
     rows.map_err(|error| format!("{}: {error}", path.display()).into())
 }

@@ -6,51 +6,37 @@ use serde::Serialize;
 /// Spans without a fix that are listed.
 const LISTED: usize = 10;
 
-#[derive(Debug, Default, Serialize)]
+/// A scan: its number, its time in ns, and whether it was found.
+pub type Located = (usize, i64, Status);
+
+#[derive(Debug, Serialize)]
 pub struct Counts {
     found: usize,
     tracked: usize,
     predicted: usize,
     lost: usize,
-    #[serde(skip)]
-    first_ns: Option<i64>,
     /// The first scan with a fix, and its time after the first scan, s.
     first_fix: Option<(usize, f64)>,
     /// The first and the last scan of each span where the localiser was lost.
-    #[serde(rename = "lost_scans")]
-    spans: Vec<(usize, usize)>,
-    #[serde(skip)]
-    was_lost: bool,
+    lost_scans: Vec<(usize, usize)>,
 }
 
 impl Counts {
-    pub fn add(&mut self, number: usize, stamp_ns: i64, status: Status) {
-        let first_ns = *self.first_ns.get_or_insert(stamp_ns);
-        match status {
-            Status::Found => self.found += 1,
-            Status::Tracked => self.tracked += 1,
-            Status::Predicted => self.predicted += 1,
-            Status::Lost => self.lost += 1,
+    pub fn of(scans: &[Located]) -> Self {
+        let count = |status: Status| scans.iter().filter(|it| it.2 == status).count();
+        let after_s = |stamp_ns: i64| stamp_ns.saturating_sub(scans[0].1) as f64 * 1e-9;
+        let first = scans.iter().find(|it| it.2 == Status::Found);
+        let is_lost = |it: &Located| it.2 == Status::Lost;
+        let spans = scans.chunk_by(|one, next| is_lost(one) == is_lost(next));
+        let lost = spans.filter(|span| is_lost(&span[0]));
+        Self {
+            found: count(Status::Found),
+            tracked: count(Status::Tracked),
+            predicted: count(Status::Predicted),
+            lost: count(Status::Lost),
+            first_fix: first.map(|(number, stamp_ns, _)| (*number, after_s(*stamp_ns))),
+            lost_scans: lost.map(|it| (it[0].0, it[it.len() - 1].0)).collect(),
         }
-        if status == Status::Found {
-            let after_s = stamp_ns.saturating_sub(first_ns) as f64 * 1e-9;
-            self.first_fix.get_or_insert((number, after_s));
-        }
-        let is_lost = status == Status::Lost;
-        match self.spans.last_mut() {
-            Some((_, last)) if is_lost && self.was_lost => *last = number,
-            _ if is_lost => self.spans.push((number, number)),
-            _ => (),
-        }
-        self.was_lost = is_lost;
-    }
-
-    pub fn scans(&self) -> usize {
-        self.found + self.tracked + self.predicted + self.lost
-    }
-
-    pub fn has_fix(&self) -> bool {
-        self.first_fix.is_some()
     }
 
     pub fn summary(&self, left_out: usize) -> String {
@@ -65,18 +51,18 @@ impl Counts {
             lost,
             ..
         } = self;
-        let (scans, fixes) = (self.scans(), found + tracked);
+        let (scans, fixes) = (found + tracked + predicted + lost, found + tracked);
         let percent = 100.0 * fixes as f64 / scans.max(1) as f64;
         text += &format!("\n{fixes} of {scans} scans localised ({percent:.1} %): ");
         text += &format!("{found} found, {tracked} tracked; {predicted} predicted, {lost} lost");
         if left_out > 0 {
             text += &format!("; {left_out} more could not be used");
         }
-        if !self.spans.is_empty() {
+        if !self.lost_scans.is_empty() {
             let span = |(first, last): &(usize, usize)| format!("{first} to {last}");
-            let spans: Vec<String> = self.spans.iter().take(LISTED).map(span).collect();
+            let spans: Vec<String> = self.lost_scans.iter().take(LISTED).map(span).collect();
             text += &format!("\nlost: scans {}", spans.join(", "));
-            let more = self.spans.len().saturating_sub(LISTED);
+            let more = self.lost_scans.len().saturating_sub(LISTED);
             if more > 0 {
                 text += &format!(" and {more} more times");
             }
@@ -90,11 +76,9 @@ mod tests {
     use super::*;
 
     fn counts(statuses: &[Status]) -> Counts {
-        let mut counts = Counts::default();
-        for (number, status) in statuses.iter().enumerate() {
-            counts.add(number, number as i64 * 250_000_000, *status);
-        }
-        counts
+        let scans = (0..).zip(statuses);
+        let located = scans.map(|(k, status)| (k, k as i64 * 250_000_000, *status));
+        Counts::of(&located.collect::<Vec<_>>())
     }
 
     #[test]
@@ -106,7 +90,6 @@ mod tests {
             lost: scans 0 to 1, 5 to 5";
         assert_eq!(counts(&drive).summary(1), expected);
         let elsewhere = counts(&[Lost; 3]);
-        assert!(!elsewhere.has_fix());
         let none = "no scan was found in the map\n0 of 3 scans localised (0.0 %)";
         assert!(elsewhere.summary(0).starts_with(none));
     }

@@ -15,19 +15,36 @@ const GRAPH: &str = "graph.g2o";
 /// The largest such file, bytes: a drive of 1,000 km.
 const MAX_GRAPH_BYTES: u64 = 1 << 30;
 
+/// Reads the graph of a run with so many keyframes.
 pub fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
-    let path = run.join(GRAPH);
-    let text =
-        gyre_storage::read_text(&path, MAX_GRAPH_BYTES).map_err(StorageError::at("read", &path))?;
-    let graph = G2o::parse(&text).map_err(|error| format!("{}: {error}", path.display()))?;
-    let (path, count) = (path.display(), graph.poses.len());
+    let graph = graph(run)?;
+    let (path, count) = (run.join(GRAPH), graph.poses.len());
     match count == keyframes {
         true => Ok(graph),
         false => Err(format!(
-            "{path} has {count} keyframes, and the run {keyframes}: run it again to its end"
+            "{} has {count} keyframes, and the run {keyframes}: run it again to its end",
+            path.display()
         )
         .into()),
     }
+}
+
+/// Returns the keyframes at both ends of each loop that a run uses; nothing without a graph.
+pub fn used_loops(run: &Path) -> Result<Vec<[usize; 2]>, Failure> {
+    if !super::exists(&run.join(GRAPH))? {
+        return Ok(Vec::new());
+    }
+    let graph = graph(run)?;
+    let odometry = graph.poses.len().saturating_sub(1);
+    let loops = graph.constraints.iter().skip(odometry);
+    Ok(loops.map(|it| [it.from, it.to]).collect())
+}
+
+fn graph(run: &Path) -> Result<G2o, Failure> {
+    let path = run.join(GRAPH);
+    let text =
+        gyre_storage::read_text(&path, MAX_GRAPH_BYTES).map_err(StorageError::at("read", &path))?;
+    Ok(G2o::parse(&text).map_err(|error| format!("{}: {error}", path.display()))?)
 }
 
 /// Places a run in a map, and reports the share of the run that was found. `names` are the folders

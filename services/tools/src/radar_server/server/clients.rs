@@ -3,7 +3,10 @@
 use std::{
     io::{self, Read, Write},
     net::{Shutdown, TcpListener, TcpStream},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
     time::{Duration, Instant},
 };
@@ -25,8 +28,13 @@ pub struct Clients {
 struct Client {
     stream: TcpStream,
     /// True once it has asked for azimuths.
-    started: bool,
-    number: u64,
+    started: Arc<AtomicBool>,
+}
+
+impl Client {
+    fn has_started(&self) -> bool {
+        self.started.load(Ordering::Relaxed)
+    }
 }
 
 impl Clients {
@@ -39,26 +47,26 @@ impl Clients {
         thread::Builder::new()
             .name("accept".to_owned())
             .spawn(move || {
-                for (number, stream) in listener.incoming().enumerate() {
+                for stream in listener.incoming() {
                     // A client that leaves at once or too many open files are no reason to stop.
                     let Ok(stream) = stream else {
                         thread::sleep(PAUSE);
                         continue;
                     };
-                    let _ = admit(stream, number as u64, &configuration, &clients);
+                    let _ = admit(stream, &configuration, &clients);
                 }
             })?;
         Ok(Self { all })
     }
 
     pub fn any_started(&self) -> bool {
-        lock(&self.all).iter().any(|client| client.started)
+        lock(&self.all).iter().any(Client::has_started)
     }
 
     /// Sends bytes to the clients that have asked for azimuths, and drops those that fail.
     pub fn send(&self, bytes: &[u8]) {
         lock(&self.all).retain_mut(|client| {
-            let takes = !client.started || write_in_time(&mut client.stream, bytes).is_ok();
+            let takes = !client.has_started() || write_in_time(&mut client.stream, bytes).is_ok();
             if !takes {
                 let _ = client.stream.shutdown(Shutdown::Both);
             }
@@ -102,7 +110,6 @@ fn write_in_time(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
 /// Sends the configuration to a client, and reads its requests in a thread.
 fn admit(
     mut stream: TcpStream,
-    number: u64,
     configuration: &[u8],
     clients: &Arc<Mutex<Vec<Client>>>,
 ) -> io::Result<()> {
@@ -113,22 +120,22 @@ fn admit(
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     stream.write_all(configuration)?;
     let reader = stream.try_clone()?;
+    let started = Arc::<AtomicBool>::default();
     lock(clients).push(Client {
         stream,
-        started: false,
-        number,
+        started: Arc::clone(&started),
     });
     let clients = Arc::clone(clients);
     thread::Builder::new()
         .name("client".to_owned())
         .spawn(move || {
-            requests(reader, number, &clients);
-            lock(&clients).retain(|client| client.number != number);
+            requests(reader, &started);
+            lock(&clients).retain(|client| !Arc::ptr_eq(&client.started, &started));
         })?;
     Ok(())
 }
 
-fn requests(mut stream: TcpStream, number: u64, clients: &Mutex<Vec<Client>>) {
+fn requests(mut stream: TcpStream, started: &AtomicBool) {
     let mut parser = Parser::default();
     while let Ok(count @ 1..) = stream.read(parser.space(256)) {
         parser.filled(count);
@@ -136,19 +143,14 @@ fn requests(mut stream: TcpStream, number: u64, clients: &Mutex<Vec<Client>>) {
             let Event::Message(Message::Request(request)) = event else {
                 continue;
             };
-            let started = match request {
-                Request::StartFft | Request::StartNonContourFft => true,
-                Request::StopFft => false,
-                // A recording has no health.
-                Request::RequestConfiguration | Request::StartHealth | Request::StopHealth => {
-                    continue;
+            match request {
+                Request::StartFft | Request::StartNonContourFft => {
+                    started.store(true, Ordering::Relaxed);
                 }
-            };
-            let mut clients = lock(clients);
-            clients
-                .iter_mut()
-                .filter(|client| client.number == number)
-                .for_each(|client| client.started = started);
+                Request::StopFft => started.store(false, Ordering::Relaxed),
+                // A recording has no health.
+                Request::RequestConfiguration | Request::StartHealth | Request::StopHealth => {}
+            }
         }
     }
 }
