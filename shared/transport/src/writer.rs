@@ -54,7 +54,7 @@ impl<M: Message> Writer<M> {
 
 impl<M> Writer<M> {
     /// Publishes a topic of messages `M`.
-    pub fn to(topic: &Topic, node: &Node, manifest: &Manifest) -> Result<Self, RunError> {
+    pub fn to(topic: &'static Topic, node: &Node, manifest: &Manifest) -> Result<Self, RunError> {
         let handshake = Listener::open(node, &handshake_event(topic.name))?;
         let data = Notifier::open(node, &data_event(topic.name))?;
         // Last, since a publisher connects to all existing readers at once.
