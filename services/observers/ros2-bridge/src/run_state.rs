@@ -1,6 +1,7 @@
 //! The state of the run, which the threads of the bridge share.
 
 use std::{
+    ops::Range,
     path::PathBuf,
     sync::{
         Mutex, MutexGuard, PoisonError,
@@ -12,8 +13,6 @@ use std::{
 use gyre_client::clock;
 use gyre_geometry::Pose;
 use gyre_ros2_messages::Vehicle;
-
-use crate::clock::offset_ns;
 
 /// The longest wait between two looks at the run.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
@@ -129,9 +128,33 @@ impl Shared {
     }
 }
 
+/// 2001-01-01, and the last second that ROS 2 can write, ns since 1970.
+const YEARS_NS: Range<i64> = 978_307_200_000_000_000..(i32::MAX as i64) * 1_000_000_000;
+
+/// Returns the offset from the stamps of a run to times of ROS, which count from 1970. The stamps
+/// of a radar or a recording that has the time are left unchanged. All other stamps get the same
+/// offset, so that the first stamp is the present time: intervals stay as the sensor measured them.
+fn offset_ns(first_ns: i64, now_ns: i64) -> i64 {
+    match YEARS_NS.contains(&first_ns) {
+        true => 0,
+        false => now_ns.saturating_sub(first_ns),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const NOW_NS: i64 = 1_800_000_000_000_000_000;
+
+    #[test]
+    fn stamps_since_1970_are_the_sensors_and_others_begin_now() {
+        assert_eq!(offset_ns(1_549_981_914_123_456_789, NOW_NS), 0);
+        for first_ns in [0, 2_000_000_000, -1, i64::MAX] {
+            let offset_ns = offset_ns(first_ns, NOW_NS);
+            assert_eq!(first_ns.saturating_add(offset_ns), NOW_NS);
+        }
+    }
 
     #[test]
     fn each_message_is_counted_once_and_gaps_are_missed() {
