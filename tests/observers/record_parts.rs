@@ -5,6 +5,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    process::Child,
     slice,
 };
 
@@ -47,14 +48,17 @@ fn a_recording_goes_on_in_the_next_file_and_each_message_is_in_one_of_them() {
     }
 }
 
+fn recorder(run: &Run, options: [&str; 2]) -> Child {
+    let mut record = gyre();
+    record.arg("record").arg(run.out()).arg("--to");
+    record.arg(file(run)).args(options).spawn().unwrap()
+}
+
 #[test]
 fn a_recorder_from_outside_goes_on_in_the_next_file_too() {
     let run = played().rate("1");
     let running = run.started(SCANS / 4);
-    let mut record = gyre();
-    record.arg("record").arg(run.out()).arg("--to");
-    record.arg(file(&run)).args(["--split-s", "0.7"]);
-    let mut recorder = record.spawn().unwrap();
+    let mut recorder = recorder(&run, ["--split-s", "0.7"]);
     running.finish().succeeded();
     assert!(recorder.wait().unwrap().success());
     let parts = parts(&file(&run));
@@ -70,14 +74,7 @@ fn a_recorder_from_outside_goes_on_in_the_next_file_too() {
 fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
     let run = played().rate("1").set("run.window=1");
     let running = run.started(SCANS / 3);
-    let mut record = gyre();
-    record
-        .arg("record")
-        .arg(run.out())
-        .arg("--to")
-        .arg(file(&run));
-    record.args(["--topics", "scan,masked"]);
-    let mut recorder = record.spawn().unwrap();
+    let mut recorder = recorder(&run, ["--topics", "scan,masked"]);
     running.finish().succeeded();
     recorder.wait().unwrap();
     let scans = seqs_in(&parts(&file(&run)), "scan");
