@@ -4,7 +4,6 @@ mod foxglove;
 mod page;
 pub mod record;
 mod record_live;
-mod record_moved;
 mod record_parts;
 mod shadow;
 mod undisturbed;

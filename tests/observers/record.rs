@@ -88,25 +88,6 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
 }
 
 #[test]
-fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() {
-    let run = recorded(&played()).rate("1");
-    let mut running = run.started(SCANS / 4);
-    let killed = running.await_child("record", None);
-    send(killed, Signal::KILL);
-    running.await_child("record", Some(killed));
-    running.finish().succeeded().says("started again");
-    assert_eq!(run.odometry(), undisturbed());
-    assert_eq!(parts(&file(&run)).len(), 2);
-    let recording = open_recording(&file(&run)).unwrap();
-    assert_eq!(recording.damages().count(), 1);
-    let first = Recording::open(&[file(&run)]).unwrap();
-    let of_first = seqs(&first, "scan");
-    assert!(!of_first.is_empty());
-    assert_eq!(seqs(&recording, "scan").len(), SCANS);
-    assert_eq!(replay(&file(&run), &[]), undisturbed());
-}
-
-#[test]
 fn a_run_that_ended_before_its_first_pose_goes_on_with_its_recording() {
     for (mode, rate) in [("lossless", "max"), ("live", "4")] {
         let run = recorded(&played().rate(rate)).set(ALL);
@@ -242,8 +223,9 @@ fn the_recorder_is_listed_with_the_health_that_it_records_and_started_again_on_r
     assert_eq!(running.complete(), undisturbed());
     let parts = parts(&file(&run));
     assert_eq!(parts.len(), 3);
-    let scans = seqs(&open_recording(&file(&run)).unwrap(), "scan");
-    assert_eq!(scans.len(), SCANS);
+    let recording = open_recording(&file(&run)).unwrap();
+    assert_eq!(seqs(&recording, "scan").len(), SCANS);
+    assert_eq!(recording.damages().count(), 1, "of the killed recorder");
     let health: Vec<Value> = parts.iter().flat_map(|part| health(part)).collect();
     assert!(health.len() >= 2, "once a second for six seconds");
     let processes = &health.last().unwrap()["status"];

@@ -41,17 +41,6 @@ fn failing(stage: &str, file: &Path) -> Run {
 }
 
 #[test]
-fn factors_of_one_change_no_byte() {
-    only_if!(python_has("numpy"));
-    for shape in ["power", "raster"] {
-        let text = format!("def mask(scan):\n    return scan.{shape} >= 0\n");
-        let (_folder, file) = file(&text);
-        let run = with(Run::of_recording(), "masking", &file);
-        assert_eq!(run.complete(), undisturbed(), "{shape}");
-    }
-}
-
-#[test]
 fn factors_of_powers_are_a_threshold_where_they_are_one() {
     only_if!(python_has("numpy"));
     let threshold = Run::of_recording().set("masking.threshold=90").complete();
@@ -211,7 +200,7 @@ fn an_interpreter_that_is_none_is_tried_once() {
 #[test]
 fn killed_it_leaves_no_interpreter_and_no_other_byte() {
     only_if!(python_has("numpy"));
-    let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
+    let (_folder, file) = file("def mask(scan):\n    return scan.raster >= 0\n");
     let run = with(Run::of_recording(), "masking", &file).rate("6");
     let mut running = run.start();
     for pose in [6, 12] {

@@ -1,19 +1,20 @@
 //! `gyre link send` and `gyre link receive`.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{env, path::PathBuf, process::ExitCode};
 
-use gyre_configuration::terminal::{Failure, INTERRUPTED, own, print};
+use gyre_configuration::terminal::{Failure, INTERRUPTED, execute_again, own, print};
 use gyre_contract::{Footprint, run::LinkConfig};
+use gyre_link::ONE_THREAD;
 use gyre_results::Out;
 use gyre_transport::{run::sweep, wake::Signals};
 
 use crate::{
     arguments::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
-    preflight, split,
+    preflight,
 };
 
 pub fn link(end: &LinkEnd) -> Result<ExitCode, Failure> {
-    split::set_environment()?;
+    set_environment()?;
     match end {
         LinkEnd::Send(arguments) => send(arguments),
         LinkEnd::Receive(arguments) => receive(arguments),
@@ -59,6 +60,16 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
         true => ExitCode::SUCCESS,
         false => ExitCode::FAILURE,
     })
+}
+
+/// Executes the same command again with the environment that the network layer needs.
+pub fn set_environment() -> Result<(), Failure> {
+    let (name, value) = ONE_THREAD;
+    if env::var_os(name).is_some_and(|set| set == value) {
+        return Ok(());
+    }
+    let failed = execute_again(env::args_os(), name, value);
+    Err(format!("cannot begin with {name} in the environment: {failed}").into())
 }
 
 fn link_of(arguments: &NetworkArguments) -> LinkConfig {

@@ -37,7 +37,7 @@ use crate::{
     preflight::{self, Preflight},
     program,
     progress::Progress,
-    simulate, split, waiting,
+    simulate, waiting,
 };
 
 pub use resolve::resolve;
@@ -49,8 +49,9 @@ const RECORDING: &str = "recording";
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     detach_if_asked();
     let configuration = resolve(arguments)?;
+    #[cfg(feature = "link")]
     if configuration.link.side.is_some() {
-        split::set_environment()?;
+        crate::link::set_environment()?;
     }
     let out = Out::lock(&results_folder(arguments)?)?;
     compute(

@@ -1,13 +1,7 @@
 //! The link of a run that is split between two machines.
 
-use std::env;
-
-use gyre_configuration::{
-    Configuration,
-    terminal::{Failure, execute_again},
-};
+use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_contract::run::LinkConfig;
-use gyre_link::ONE_THREAD;
 
 /// Checks that the other side of a split run can be reached as it is configured.
 pub fn check(configuration: &Configuration) -> Result<(), Failure> {
@@ -18,16 +12,6 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
     return Err(crate::features::absent(crate::features::LINK).into());
     #[cfg(feature = "link")]
     gyre_link::check(&configuration.link).map_err(|error| format!("[link]: {error}").into())
-}
-
-/// Executes the same command again with the environment that the network layer needs.
-pub fn set_environment() -> Result<(), Failure> {
-    let (name, value) = ONE_THREAD;
-    if env::var_os(name).is_some_and(|set| set == value) {
-        return Ok(());
-    }
-    let failed = execute_again(env::args_os(), name, value);
-    Err(format!("cannot begin with {name} in the environment: {failed}").into())
 }
 
 /// Returns the size of the largest scan, bytes, if scans are sent: the robot knows it.

@@ -24,7 +24,7 @@ use gyre_transport::{
     AnyMessage, Listener, Manifest, RecordedMessage, RunError, generation,
     heartbeat::HeartbeatWriter,
     numbers::{self, Numbers},
-    reader::{self, Port, Received, Subscriber},
+    reader::{self, Port, Received},
     run,
     sessions::not_running,
     transport::{self, Node, Service},
@@ -202,13 +202,12 @@ impl Run {
         if service.subscribers_named(NAME) >= places {
             return Err(no_place());
         }
-        let subscriber = Subscriber::create(&service, Some(NAME))?;
+        let port = Port::of(&service, Some(NAME), &self.0.node, &self.0.manifest)?;
         // Another observer may have come at the same time. The places of the stages must stay free
         // for their restarts.
         if service.subscribers_named(NAME) > places {
             return Err(no_place());
         }
-        let port = Port::of(subscriber, topic, &self.0.node, &self.0.manifest)?;
         reader::notify_publisher(&self.0.node, topic.name)?;
         Ok(port)
     }

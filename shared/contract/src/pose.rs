@@ -1,6 +1,7 @@
 //! `pose`: the pose of the vehicle, which is also the credit that admits a new scan.
 
 use gyre_geometry::{ComposedMotion, UncertainMotion, covariance, pose, xy_yaw};
+use gyre_storage::{LogMagic, Record};
 
 use crate::{
     item::Item,
@@ -50,6 +51,21 @@ impl PoseHeader {
             self.pose(),
             covariance::unpack(&self.accumulated_covariance),
         )
+    }
+}
+
+/// The journal of a run: its poses, then the end of the stream, since its item counts the scans.
+impl Record for PoseHeader {
+    const FILE: &'static str = "poses.journal";
+    const MAGIC: LogMagic = *b"gyre journal v13";
+    const LENGTH: Option<usize> = Some(size_of::<Self>());
+
+    fn encode(&self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(bytemuck::bytes_of(self));
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        bytemuck::try_pod_read_unaligned(bytes).ok()
     }
 }
 

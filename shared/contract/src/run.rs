@@ -25,6 +25,8 @@ pub use source::{PlayedFault, PlayedFaultKind, PlayedFrom, SourceConfig, SourceK
 
 /// The file in the folder of the results with the configuration of the run's begin, TOML.
 pub const BEGUN_WITH: &str = "journal/run.toml";
+/// The file there with the state of the refinement.
+pub const REFINEMENT_STATE: &str = "journal/refinement.map";
 /// The file there that a run leaves when it has all its results. The next run starts from the first
 /// scan.
 pub const COMPLETE: &str = "journal/complete";

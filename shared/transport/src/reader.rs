@@ -5,7 +5,7 @@ use std::{marker::PhantomData, slice};
 use bytemuck::Pod;
 use gyre_contract::{Item, Limits, Message, Topic, flag};
 use iceoryx2::{
-    port::{ReceiveError, port_name::PortName, subscriber},
+    port::{ReceiveError, port_name::PortName, subscriber::Subscriber},
     sample::Sample,
 };
 
@@ -18,45 +18,6 @@ use crate::{
 };
 
 type Bytes = Sample<Ipc, AnyPayload, AnyHeader>;
-
-pub struct Subscriber {
-    topic: &'static str,
-    is_observer: bool,
-    port: subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>,
-}
-
-impl Subscriber {
-    /// Subscribes as a process of the run, or as an observer, under a name for counting observers.
-    pub fn create(service: &Service, observer: Option<&str>) -> Result<Self, RunError> {
-        let topic = service.topic.name;
-        let mut builder = service.factory.subscriber_builder();
-        if let Some(name) = observer {
-            let name = PortName::new(name);
-            builder = builder.name(&name.map_err(|e| RunError::transport("name the observer", e))?);
-        }
-        let port = builder.create();
-        let port = port.map_err(|e| RunError::transport(format!("subscribe to {topic}"), e))?;
-        Ok(Self {
-            topic,
-            is_observer: observer.is_some(),
-            port,
-        })
-    }
-
-    /// Receives the next message; `None` if the queue is empty, or cannot be read now.
-    fn receive(&self) -> Result<Option<Bytes>, RunError> {
-        match self.port.receive() {
-            Ok(sample) => Ok(sample),
-            // Samples of a dead publisher are still borrowed. The next call succeeds once they are
-            // released.
-            Err(ReceiveError::ExceedsMaxBorrows) if !self.is_observer => Ok(None),
-            // The publisher has just died or is being restarted. Its next message is found at the
-            // next wake-up.
-            Err(ReceiveError::ConnectionFailure(_)) if self.is_observer => Ok(None),
-            Err(e) => Err(RunError::transport(format!("receive {}", self.topic), e)),
-        }
-    }
-}
 
 /// A message in shared memory, borrowed from its publisher until it is dropped.
 pub struct Received<M> {
@@ -120,7 +81,8 @@ impl<M> Received<M> {
 pub struct Port<M> {
     pub topic: &'static Topic,
     limits: Limits,
-    subscriber: Subscriber,
+    is_observer: bool,
+    subscriber: Subscriber<Ipc, AnyPayload, AnyHeader>,
     data: Listener,
     message: PhantomData<M>,
 }
@@ -145,29 +107,55 @@ impl<M> Port<M> {
         node: &Node,
         manifest: &Manifest,
     ) -> Result<Self, RunError> {
-        let subscriber = Subscriber::create(&Service::open(node, topic)?, None)?;
-        Self::of(subscriber, topic, node, manifest)
+        Self::of(&Service::open(node, topic)?, None, node, manifest)
     }
 
+    /// Subscribes as a process of the run, or as an observer, under a name for counting observers.
     pub fn of(
-        subscriber: Subscriber,
-        topic: &'static Topic,
+        service: &Service,
+        observer: Option<&str>,
         node: &Node,
         manifest: &Manifest,
     ) -> Result<Self, RunError> {
-        let data = Listener::open(node, &data_event(topic.name))?;
+        let topic = service.topic;
+        let mut builder = service.factory.subscriber_builder();
+        if let Some(name) = observer {
+            let name = PortName::new(name);
+            builder = builder.name(&name.map_err(|e| RunError::transport("name the observer", e))?);
+        }
+        let subscriber = builder
+            .create()
+            .map_err(|e| RunError::transport(format!("subscribe to {}", topic.name), e))?;
         Ok(Self {
             topic,
             limits: manifest.limits,
+            is_observer: observer.is_some(),
             subscriber,
-            data,
+            data: Listener::open(node, &data_event(topic.name))?,
             message: PhantomData,
         })
     }
 
+    /// Receives the next sample; `None` if the queue is empty, or cannot be read now.
+    fn sample(&self) -> Result<Option<Bytes>, RunError> {
+        match self.subscriber.receive() {
+            Ok(sample) => Ok(sample),
+            // Samples of a dead publisher are still borrowed. The next call succeeds once they are
+            // released.
+            Err(ReceiveError::ExceedsMaxBorrows) if !self.is_observer => Ok(None),
+            // The publisher has just died or is being restarted. Its next message is found at the
+            // next wake-up.
+            Err(ReceiveError::ConnectionFailure(_)) if self.is_observer => Ok(None),
+            Err(e) => Err(RunError::transport(
+                format!("receive {}", self.topic.name),
+                e,
+            )),
+        }
+    }
+
     /// Receives the next message and checks it; `None` if the queue is empty.
     pub fn receive(&self) -> Result<Option<Received<M>>, RunError> {
-        let Some(sample) = self.subscriber.receive()? else {
+        let Some(sample) = self.sample()? else {
             return Ok(None);
         };
         let received = Received {

@@ -28,7 +28,7 @@ impl LogId {
 
 /// All services of a run. They exist as long as this value.
 pub struct Services {
-    topics: Vec<(&'static Topic, Service)>,
+    topics: Vec<Service>,
     _events: Vec<Event>,
 }
 
@@ -44,7 +44,7 @@ impl Services {
             let (subscribers, nodes) = (sizes.subscribers(), sizes.nodes());
             event(&data_event(name), [subscribers, 1], nodes)?;
             event(&handshake_event(name), [1, subscribers], nodes)?;
-            topics.push((topic, Service::create(node, topic, window)?));
+            topics.push(Service::create(node, topic, window)?);
         }
         if window.logs_points() {
             let nodes = Pose::sizes(window).nodes();
@@ -59,8 +59,8 @@ impl Services {
     }
 
     pub fn subscribers(&self, topic: &str) -> usize {
-        let topics = self.topics.iter().filter(|it| it.0.name == topic);
-        topics.map(|(_, service)| service.subscribers()).sum()
+        let topics = self.topics.iter().filter(|it| it.topic.name == topic);
+        topics.map(Service::subscribers).sum()
     }
 
     /// Returns whether a stage has opened the topic that it publishes, which stages do last. A dead
@@ -71,6 +71,6 @@ impl Services {
             Sender::Follower(_) => false,
         };
         let mut topics = self.topics.iter();
-        topics.any(|(topic, service)| is_sent(topic) && service.has_publisher())
+        topics.any(|service| is_sent(service.topic) && service.has_publisher())
     }
 }

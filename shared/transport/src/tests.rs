@@ -2,7 +2,6 @@
 
 mod generations;
 mod hand_over;
-mod logs;
 mod typed;
 mod wake_up;
 mod zero_copy;

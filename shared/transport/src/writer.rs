@@ -54,7 +54,7 @@ impl<M: Message> Writer<M> {
 
 impl<M> Writer<M> {
     /// Publishes a topic of messages `M`.
-    pub fn to(topic: &Topic, node: &Node, manifest: &Manifest) -> Result<Self, RunError> {
+    pub fn to(topic: &'static Topic, node: &Node, manifest: &Manifest) -> Result<Self, RunError> {
         let handshake = Listener::open(node, &handshake_event(topic.name))?;
         let data = Notifier::open(node, &data_event(topic.name))?;
         // Last, since a publisher connects to all existing readers at once.
@@ -126,14 +126,10 @@ impl<M> Writer<M> {
     /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
     /// topics, so unconditional wake-ups would circulate for ever.
     pub fn accept_readers(&self) -> Result<(), RunError> {
-        let new_reader = self.handshake.take()? > 0;
-        // Unconditionally: after a lost handshake the reader finds the history at the end of its
-        // own wait.
-        self.connect()?;
-        if new_reader {
-            self.data.notify()
-        } else {
-            Ok(())
+        match self.answer_handshakes()? {
+            true => Ok(()),
+            // After a lost handshake the reader finds the history at the end of its own wait.
+            false => self.connect(),
         }
     }
 

@@ -7,45 +7,30 @@
 //! receiver asks again from where it is. So a message that is still there (`replay_buffer`) is
 //! neither lost nor doubled, and the sender keeps no state of a receiver.
 
-mod network;
+#![cfg(feature = "zenoh")]
 
-#[cfg(feature = "zenoh")]
 mod base;
-#[cfg(feature = "zenoh")]
 mod connection_log;
-#[cfg(feature = "zenoh")]
 mod error;
-#[cfg(feature = "zenoh")]
 mod fetch;
-#[cfg(feature = "zenoh")]
 mod handshake;
-#[cfg(feature = "zenoh")]
+mod network;
 mod patience;
-#[cfg(feature = "zenoh")]
 mod receive;
-#[cfg(feature = "zenoh")]
 mod replay_buffer;
-#[cfg(feature = "zenoh")]
 mod request;
-#[cfg(feature = "zenoh")]
 mod robot;
-#[cfg(feature = "zenoh")]
 mod send;
-#[cfg(feature = "zenoh")]
 mod serve;
-#[cfg(feature = "zenoh")]
 mod session;
-#[cfg(all(test, feature = "zenoh"))]
+#[cfg(test)]
 mod tests;
-#[cfg(feature = "zenoh")]
 mod waker;
 
-pub use network::{ONE_THREAD, check};
-
-#[cfg(feature = "zenoh")]
 pub use {
     base::run as run_base,
     handshake::ask_robot,
+    network::{ONE_THREAD, check},
     receive::{Received, ask, receive},
     robot::run as run_robot,
     send::{Sent, send},

@@ -1,11 +1,11 @@
 //! Receives the topics of a run of another machine, and publishes them here as a run of its own,
 //! for everything that observes runs.
 
-mod counts;
 mod mirror;
 
 use std::{
-    fs,
+    collections::BTreeMap,
+    fmt, fs,
     io::ErrorKind,
     path::{Path, PathBuf},
     time::Duration,
@@ -20,18 +20,52 @@ use zenoh::{Session, Wait};
 use crate::{
     error::other_version,
     request::Question,
-    send::{OfferedTopic, RunOffer, began_ns, offer_key},
+    send::{OfferedTopic, RunOffer, began_ns, is_lossless, offer_key},
     session,
     waker::Waker,
 };
 
-pub use counts::{Received, ReceivedCount};
 use mirror::Mirror;
 
 const NAME: &str = "link";
 const PAUSE: Duration = Duration::from_millis(200);
 
 const ASK_FOR_RUN: Question = Question("ask for a run", "the sender");
+
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Received {
+    pub topics: BTreeMap<String, ReceivedCount>,
+    /// True if it ended on a request to stop, before the run.
+    pub is_interrupted: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReceivedCount {
+    pub received: u64,
+    pub missed: u64,
+}
+
+impl Received {
+    pub fn is_complete(&self) -> bool {
+        let mut topics = self.topics.iter();
+        topics.all(|(topic, count)| !is_lossless(topic) || count.missed == 0)
+    }
+}
+
+impl fmt::Display for Received {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |number: fn(&ReceivedCount) -> u64| {
+            let topics = self.topics.iter().filter(|it| number(it.1) > 0);
+            let topics = topics.map(|(topic, count)| format!("{} {topic}", number(count)));
+            match &topics.collect::<Vec<String>>()[..] {
+                [] => "nothing".to_owned(),
+                topics => topics.join(", "),
+            }
+        };
+        let (received, missed) = (list(|it| it.received), list(|it| it.missed));
+        write!(f, "received {received}; missed {missed}")
+    }
+}
 
 pub struct RemoteRun {
     session: Session,

@@ -131,7 +131,7 @@ fn follow_poses(
 fn sentence(state: &RunState) -> String {
     let (poses, first) = (state.poses.published, state.poses.first.unwrap_or_default());
     let (objects, maps, unsent) = (state.objects.published, state.maps, state.unsent);
-    let (missed, missed_objects) = (state.poses.missed, state.objects.missed);
+    let (missed, missed_objects) = (state.poses.missed(), state.objects.missed());
     format!(
         "the run has ended: {poses} poses from number {first} on, {maps} maps and the objects of {objects} scans published, the objects of {missed_objects} scans and {missed} poses missed; {unsent} messages not sent because readers were behind"
     )
@@ -162,7 +162,7 @@ impl PoseTopics {
         let (stamp_ns, map_from_odometry) = {
             let mut state = shared.state();
             // The pose was published before the stream was interrupted.
-            if !state.poses.count(pose.item.seq) {
+            if !state.poses.count(&pose.item) {
                 return;
             }
             let stamp_ns = state.stamp_ns(pose.item.stamp_ns, say);
@@ -184,7 +184,7 @@ impl ObjectTopics {
         let stamp_ns = {
             let mut state = shared.state();
             // They were published before the stream was interrupted.
-            if !state.objects.count(header.item.seq) {
+            if !state.objects.count(&header.item) {
                 return;
             }
             state.stamp_ns(header.item.stamp_ns, say)

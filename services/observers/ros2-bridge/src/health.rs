@@ -79,9 +79,9 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
     };
     let of_bridge = [
         ("poses published", state.poses.published),
-        ("poses missed", state.poses.missed),
+        ("poses missed", state.poses.missed()),
         ("objects published", state.objects.published),
-        ("objects missed", state.objects.missed),
+        ("objects missed", state.objects.missed()),
         ("messages not sent", state.unsent),
         ("maps published", state.maps),
     ];

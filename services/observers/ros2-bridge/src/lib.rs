@@ -4,7 +4,6 @@
 #![cfg(feature = "dds")]
 
 mod bridge;
-mod clock;
 mod following;
 mod health;
 mod live_map;

@@ -1,6 +1,7 @@
 //! The state of the run, which the threads of the bridge share.
 
 use std::{
+    ops::Range,
     path::PathBuf,
     sync::{
         Mutex, MutexGuard, PoisonError,
@@ -9,11 +10,10 @@ use std::{
     time::Duration,
 };
 
-use gyre_client::clock;
+use gyre_client::{clock, observer::Sequence};
+use gyre_contract::Item;
 use gyre_geometry::Pose;
 use gyre_ros2_messages::Vehicle;
-
-use crate::clock::offset_ns;
 
 /// The longest wait between two looks at the run.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
@@ -41,28 +41,28 @@ pub struct RunState {
 }
 
 /// Counts of the messages of a topic, which have a number for each scan.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct Counts {
     /// The number of the first one that was published: those before it came before the bridge.
     pub first: Option<u64>,
-    pub newest: Option<u64>,
     pub published: u64,
-    pub missed: u64,
+    sequence: Sequence,
 }
 
 impl Counts {
     /// Counts a message, and the messages missing before it. False for one that was published
     /// before.
-    pub fn count(&mut self, seq: u64) -> bool {
-        let next = self.newest.map_or(seq, |newest| newest + 1);
-        if seq < next {
-            return false;
+    pub fn count(&mut self, item: &Item) -> bool {
+        let is_new = self.sequence.advance(item).is_some();
+        if is_new {
+            self.first.get_or_insert(item.seq);
+            self.published += 1;
         }
-        self.first.get_or_insert(seq);
-        self.missed += seq - next;
-        self.newest = Some(seq);
-        self.published += 1;
-        true
+        is_new
+    }
+
+    pub fn missed(&self) -> u64 {
+        self.sequence.missed
     }
 }
 
@@ -84,7 +84,7 @@ impl RunState {
 
     /// Returns the number of messages that were not published or not sent.
     pub fn lost(&self) -> u64 {
-        self.poses.missed + self.objects.missed + self.unsent
+        self.poses.missed() + self.objects.missed() + self.unsent
     }
 }
 
@@ -129,16 +129,31 @@ impl Shared {
     }
 }
 
+/// 2001-01-01, and the last second that ROS 2 can write, ns since 1970.
+const YEARS_NS: Range<i64> = 978_307_200_000_000_000..(i32::MAX as i64) * 1_000_000_000;
+
+/// Returns the offset from the stamps of a run to times of ROS, which count from 1970. The stamps
+/// of a radar or a recording that has the time are left unchanged. All other stamps get the same
+/// offset, so that the first stamp is the present time: intervals stay as the sensor measured them.
+fn offset_ns(first_ns: i64, now_ns: i64) -> i64 {
+    match YEARS_NS.contains(&first_ns) {
+        true => 0,
+        false => now_ns.saturating_sub(first_ns),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const NOW_NS: i64 = 1_800_000_000_000_000_000;
+
     #[test]
-    fn each_message_is_counted_once_and_gaps_are_missed() {
-        let mut counts = Counts::default();
-        let counted: Vec<bool> = [7, 8, 8, 7, 11, 12].map(|seq| counts.count(seq)).to_vec();
-        assert_eq!(counted, [true, true, false, false, true, true]);
-        assert_eq!((counts.first, counts.newest), (Some(7), Some(12)));
-        assert_eq!((counts.published, counts.missed), (4, 2));
+    fn stamps_since_1970_are_the_sensors_and_others_begin_now() {
+        assert_eq!(offset_ns(1_549_981_914_123_456_789, NOW_NS), 0);
+        for first_ns in [0, 2_000_000_000, -1, i64::MAX] {
+            let offset_ns = offset_ns(first_ns, NOW_NS);
+            assert_eq!(first_ns.saturating_add(offset_ns), NOW_NS);
+        }
     }
 }

@@ -4,8 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
+use gyre_client::RecordReader;
 use gyre_contract::PoseHeader;
-use gyre_journal as journal;
 
 /// Poses that are read at once: about a megabyte.
 const PART: usize = 2000;
@@ -31,8 +31,9 @@ impl JournalTrack {
             return false;
         }
         if seq > self.next {
-            let records = journal::poses_from(&self.out, self.next);
-            let records = records.into_iter().flatten();
+            let journal = RecordReader::<PoseHeader>::open(&self.out);
+            let journal = journal.map(|it| it.from(self.next as usize));
+            let records = journal.into_iter().flatten();
             // Poses that the journal lacks are not drawn.
             let before = records.map_while(Result::ok);
             let before = before.take_while(|before| before.item.seq < seq);
@@ -51,7 +52,7 @@ impl JournalTrack {
 #[cfg(test)]
 mod tests {
     use gyre_contract::Item;
-    use gyre_journal::Journal;
+    use gyre_storage::RecordLog;
 
     use super::*;
 
@@ -65,7 +66,7 @@ mod tests {
     #[test]
     fn the_poses_of_the_journal_are_drawn_once_and_the_newest_poses_follow_them() {
         let out = tempfile::tempdir().unwrap();
-        let mut journal = Journal::open(out.path()).unwrap();
+        let mut journal = RecordLog::open(out.path()).unwrap();
         let poses = 2 * PART as u64 + 10;
         (0..poses).for_each(|seq| journal.append(&pose(seq)).unwrap());
         let mut track = JournalTrack::of(out.path());

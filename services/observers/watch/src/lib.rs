@@ -9,7 +9,6 @@ mod access;
 mod connections;
 mod delays;
 mod foxglove;
-mod frame;
 mod histograms;
 mod journal_track;
 mod messages;

@@ -1,12 +1,14 @@
-//! Scans, rasters and points, made small for a browser.
+//! Scans, rasters and points, made small for a browser: a header in JSON and compressed bytes.
+
+use std::io::{self, Write};
 
 use axum::body::Bytes;
+use flate2::{Compression, write::DeflateEncoder};
 use gyre_contract::MaskedHeader;
 use gyre_geometry::{PolarScan, Sense, SparsePoint};
 use ndarray::ArrayView2;
+use serde::Serialize;
 use serde_json::json;
-
-use crate::frame;
 
 /// The most azimuths of a picture: no Navtech radar measures more.
 const MAX_AZIMUTHS: usize = 400;
@@ -21,7 +23,7 @@ const POINT_UNIT_M: f64 = 0.02;
 
 /// Makes a picture of a scan: the strongest return in each cell. Azimuth `a` looks at
 /// `2 pi a / azimuths`, counter-clockwise from straight ahead.
-pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Bytes> {
+pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> io::Result<Bytes> {
     let geometry = &scan.geometry;
     let azimuths = geometry.azimuths.min(MAX_AZIMUTHS);
     let bins_of_one = geometry.bins.div_ceil(MAX_BINS).max(1);
@@ -54,7 +56,7 @@ pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Byte
         // Weaker powers are noise, and sent as 0.
         "floor": floor,
     });
-    frame::encode(&picture, &powers)
+    encode(&picture, &powers)
 }
 
 /// Returns the power below which most cells are.
@@ -84,7 +86,7 @@ fn column_of(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
 
 /// Makes a picture of a masked raster: the strongest value of each cell, relative to the maximum.
 /// Row 0 is far ahead, column 0 far left.
-pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> std::io::Result<Bytes> {
+pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> io::Result<Bytes> {
     let n = raster.nrows();
     let cells_of_one = n.div_ceil(MAX_SIDE).max(1);
     let side = n.div_ceil(cells_of_one);
@@ -100,7 +102,7 @@ pub fn raster(raster: ArrayView2<'_, f32>, cell_m: f32, seq: u64) -> std::io::Re
     }
     let width_m = (side * cells_of_one) as f64 * f64::from(cell_m);
     let picture = json!({"kind": "raster", "seq": seq, "side": side, "width_m": width_m});
-    frame::encode(&picture, &cells)
+    encode(&picture, &cells)
 }
 
 /// Points of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in
@@ -120,10 +122,32 @@ pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> PackedPoints {
 
 impl PackedPoints {
     /// Makes a message of the points and the pose of their scan.
-    pub fn at(&self, pose: [f64; 3], seq: u64) -> std::io::Result<Bytes> {
+    pub fn at(&self, pose: [f64; 3], seq: u64) -> io::Result<Bytes> {
         let picture = json!({"kind": "points", "seq": seq, "pose": pose, "unit_m": POINT_UNIT_M});
-        frame::encode(&picture, &self.0)
+        encode(&picture, &self.0)
     }
+}
+
+/// A message to the page: the length of the header (u32, little-endian), the header in JSON, and
+/// the payload, deflated (RFC 1951).
+fn encode(header: &impl Serialize, payload: &[u8]) -> io::Result<Bytes> {
+    let header = serde_json::to_vec(header)?;
+    let mut message = (header.len() as u32).to_le_bytes().to_vec();
+    message.extend(header);
+    let mut encoder = DeflateEncoder::new(message, Compression::fast());
+    encoder.write_all(payload)?;
+    Ok(encoder.finish()?.into())
+}
+
+#[cfg(test)]
+pub fn decode(message: &[u8]) -> Option<(serde_json::Value, Vec<u8>)> {
+    use std::io::Read;
+    let (length, rest) = message.split_first_chunk::<4>()?;
+    let (header, deflated) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+    let mut payload = Vec::new();
+    let mut decoder = flate2::read::DeflateDecoder::new(deflated);
+    decoder.read_to_end(&mut payload).ok()?;
+    Some((serde_json::from_slice(header).ok()?, payload))
 }
 
 #[cfg(test)]
@@ -161,7 +185,7 @@ mod tests {
             stamp_ns: &stamp_ns,
             flags: &[1; AZIMUTHS],
         };
-        frame::decode(&scan(&sweep, 7, 9).unwrap()).unwrap()
+        decode(&scan(&sweep, 7, 9).unwrap()).unwrap()
     }
 
     #[test]
@@ -184,13 +208,13 @@ mod tests {
         let mut cells = Array2::zeros((511, 511));
         cells[[0, 510]] = 0.5_f32;
         cells[[255, 255]] = 0.25;
-        let (header, bytes) = frame::decode(&raster(cells.view(), 0.4, 3).unwrap()).unwrap();
+        let (header, bytes) = decode(&raster(cells.view(), 0.4, 3).unwrap()).unwrap();
         let side = header["side"].as_u64().unwrap() as usize;
         assert_eq!((side, bytes.len()), (256, 256 * 256));
         assert!((header["width_m"].as_f64().unwrap() - 204.8).abs() < 1e-3);
         assert_eq!((bytes[255], bytes[127 * 256 + 127]), (248, 120));
         let dark = raster(Array2::zeros((3, 3)).view(), 0.4, 3).unwrap();
-        assert_eq!(frame::decode(&dark).unwrap().1, [0; 9]);
+        assert_eq!(decode(&dark).unwrap().1, [0; 9]);
     }
 
     #[test]
@@ -205,7 +229,7 @@ mod tests {
         let seen = [(1.0, -2.0, 1.0), (5.0, 5.0, 0.0), (1e9, 0.0, 0.5)];
         let seen = seen.map(|(x_m, y_m, weight)| point(x_m, y_m, weight));
         let small = points(&seen, &MaskedHeader::default());
-        let (header, bytes) = frame::decode(&small.at([1.0, 2.0, 3.0], 4).unwrap()).unwrap();
+        let (header, bytes) = decode(&small.at([1.0, 2.0, 3.0], 4).unwrap()).unwrap();
         assert_eq!(header["pose"], serde_json::json!([1.0, 2.0, 3.0]));
         let values = [50, -100, i16::MAX, 0].map(i16::to_le_bytes);
         assert_eq!(bytes, values.concat());

@@ -7,10 +7,8 @@
 
 mod begin;
 mod health;
-mod options;
 mod queue;
 mod tap;
-mod writing;
 
 use std::{
     fmt,
@@ -26,16 +24,28 @@ use gyre_recording::{LogTail, Positions, SplitWriter};
 
 use begin::{begin, failed};
 use health::health;
-use options::{HEALTH, LOG};
-use queue::{Entry, LIMIT_BYTES, Sender, queue};
+use queue::{Entry, LIMIT_BYTES, Sender, queue, write};
 use tap::{Counts, Tap};
 
 pub use begin::{require_new, require_own};
 pub use gyre_recording::{Ledger, Split};
-pub use options::Options;
 
+const LOG: &str = "log";
+const HEALTH: &str = "health";
 const NAME: &str = "recorder";
 const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
+
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub out: PathBuf,
+    pub to: PathBuf,
+    /// The topics, `log` and `health` among them; empty: the default ones that the run has.
+    pub topics: Vec<String>,
+    pub split: Split,
+    /// True if an existing recording belongs to this run, begun by another recorder: it continues
+    /// in its next part.
+    pub continues: bool,
+}
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
@@ -93,7 +103,7 @@ pub fn record(options: &Options) -> Result<Recorded, RunError> {
     let log = has(LOG).then(|| LogTail::new(&manifest.events()));
     let health = has(HEALTH).then(|| health(manifest.out.clone()));
     let (sender, receiver) = queue(LIMIT_BYTES);
-    let writing = thread::spawn(move || writing::write(writer, &receiver));
+    let writing = thread::spawn(move || write(writer, &receiver));
     let mut recorder = Recorder {
         run: &run,
         signals,

@@ -327,7 +327,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::{frame, pictures};
+    use crate::pictures;
 
     fn pose(seq: u64) -> PoseHeader {
         let mut item = Item::numbered(seq);
@@ -360,7 +360,7 @@ mod tests {
         let view = RunView::new("out");
         let sent = || {
             let message = view.updates.of(Layer::Points).borrow().clone()?;
-            let (header, _) = frame::decode(&message.into_data())?;
+            let (header, _) = pictures::decode(&message.into_data())?;
             header["pose"][0].as_f64()
         };
         view.add_pose(&pose(3));

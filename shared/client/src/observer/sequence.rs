@@ -4,7 +4,7 @@ use gyre_contract::{GivenAnew, Item, flag};
 
 /// The position in a sequence of items that are consecutive at the publisher, until it reuses
 /// numbers.
-#[derive(Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sequence {
     /// The number behind the newest item.
     pub next: Option<u64>,

@@ -15,7 +15,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_contract::{MotionEstimate, PoseHeader};
+use gyre_contract::{MotionEstimate, PoseHeader, run::REFINEMENT_STATE};
 use gyre_matching::{Refiner, TrackerState};
 use gyre_storage::{DurableFile, GroupSync, LogError, Slots, StorageError};
 
@@ -67,7 +67,7 @@ struct Layout {
 }
 
 pub fn path(out: &Path) -> PathBuf {
-    out.join("journal").join("refinement.map")
+    out.join(REFINEMENT_STATE)
 }
 
 /// Returns the checksum of a motion, which links a state to a pose.

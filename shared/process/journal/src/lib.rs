@@ -21,33 +21,15 @@ use std::{
 
 use gyre_contract::{PoseHeader, flag};
 use gyre_geometry::SparsePoint;
-use gyre_storage::{GroupSync, LogError, LogMagic, Record, RecordLog, RecordReader, records_path};
+use gyre_storage::{GroupSync, LogError, RecordLog, RecordReader, records_path};
 
 pub use gyre_storage::continue_when_full;
 
 /// Number of the last poses that a check returns: more than a power failure can take.
 const LAST: usize = 8 * GroupSync::LIMIT as usize;
 
-/// A record of the journal. The end of the stream is one too, since its item counts the scans.
 #[derive(Debug)]
-struct LoggedPose(PoseHeader);
-
-impl Record for LoggedPose {
-    const FILE: &'static str = "poses.journal";
-    const MAGIC: LogMagic = *b"gyre journal v13";
-    const LENGTH: Option<usize> = Some(size_of::<PoseHeader>());
-
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        bytes.extend_from_slice(bytemuck::bytes_of(&self.0));
-    }
-
-    fn decode(bytes: &[u8]) -> Option<Self> {
-        bytemuck::try_pod_read_unaligned(bytes).ok().map(Self)
-    }
-}
-
-#[derive(Debug)]
-pub struct Journal(RecordLog<LoggedPose>);
+pub struct Journal(RecordLog<PoseHeader>);
 
 /// A log of poses with the points of their scans, each appended before its pose is journalled.
 pub trait PoseLog {
@@ -63,7 +45,7 @@ pub trait PoseLog {
 }
 
 pub fn path(out: &Path) -> PathBuf {
-    records_path::<LoggedPose>(out)
+    records_path::<PoseHeader>(out)
 }
 
 /// Reads the poses of a run, oldest first, and the end of the stream; none without a journal.
@@ -79,8 +61,7 @@ pub fn poses_from(
     first: u64,
 ) -> Result<impl Iterator<Item = Result<PoseHeader, LogError>> + use<>, LogError> {
     let first = usize::try_from(first).unwrap_or(usize::MAX);
-    let records = RecordReader::<LoggedPose>::open(out)?.from(first);
-    Ok(records.map(|record| record.map(|LoggedPose(pose)| pose)))
+    Ok(RecordReader::<PoseHeader>::open(out)?.from(first))
 }
 
 impl Journal {
@@ -101,7 +82,7 @@ impl Journal {
             if poses.len() == count {
                 break;
             }
-            let LoggedPose(pose) = self.0.read(index)?;
+            let pose = self.0.read(index)?;
             match pose.item.is(flag::END) {
                 true => ended = true,
                 false => poses.push(pose),
@@ -113,7 +94,7 @@ impl Journal {
 
     /// Appends a pose, or the end of the stream.
     pub fn append(&mut self, pose: &PoseHeader) -> Result<(), LogError> {
-        self.0.append(&LoggedPose(*pose))
+        self.0.append(pose)
     }
 
     /// Waits until all that was appended survives a power failure.
@@ -135,10 +116,10 @@ pub struct Content {
 
 /// Reads a whole journal, in bounded memory, and finds out what of it is valid. Changes nothing.
 pub fn check(out: &Path) -> Result<Content, LogError> {
-    let mut reader = RecordReader::<LoggedPose>::open(out)?;
+    let mut reader = RecordReader::<PoseHeader>::open(out)?;
     let mut content = Content::default();
     for index in 0..reader.len() {
-        let LoggedPose(pose) = reader.read(index)?;
+        let pose = reader.read(index)?;
         if content.ended {
             content.torn += 1;
             continue;
@@ -159,6 +140,6 @@ pub fn check(out: &Path) -> Result<Content, LogError> {
 /// Cuts a journal after `records` records. The cut survives a power failure. Waits up to a second
 /// for a stage of a killed run that still writes it: that dies a moment after its supervisor.
 pub fn cut(out: &Path, records: u64) -> Result<(), LogError> {
-    let mut log = RecordLog::<LoggedPose>::open(out)?;
+    let mut log = RecordLog::<PoseHeader>::open(out)?;
     log.cut(usize::try_from(records).unwrap_or(usize::MAX))
 }

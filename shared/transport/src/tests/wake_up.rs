@@ -8,8 +8,12 @@ use std::{
 
 use gyre_contract::Pose;
 
-use super::{Run, WINDOW, reader, send, writer};
-use crate::{transport::bind_alone, wake::Signals};
+use super::{Run, WINDOW, node, reader, send, writer};
+use crate::{
+    services::LogId,
+    transport::{Listener, Notifier, bind_alone},
+    wake::Signals,
+};
 
 const LONG: Duration = Duration::from_secs(5);
 
@@ -53,6 +57,22 @@ fn a_handshake_is_answered_once() {
     poses.accept_readers().unwrap();
     assert_eq!(woken(), 0);
 }
+
+#[test]
+fn all_followers_of_a_log_are_woken_and_a_dead_one_does_not_matter() {
+    let run = Run::begin();
+    let node = node(&run.manifest);
+    let event = LogId::Keyframes.name();
+    let notifier = Notifier::open(&node, event).unwrap();
+    let [first, second] = [(); 2].map(|()| Listener::open(&node, event).unwrap());
+    let woken = |listener: &Listener| listener.take().unwrap() > 0;
+    notifier.notify().unwrap();
+    assert!(woken(&first) && woken(&second) && !woken(&first));
+    drop(first);
+    notifier.notify().unwrap();
+    assert!(woken(&second));
+}
+
 #[test]
 fn listeners_of_many_threads_leave_the_umask_of_the_process_as_it_was() {
     let umask = || {

@@ -14,12 +14,16 @@ use super::{AnyHeader, AnyPayload, Ipc, Node, service_name};
 use crate::RunError;
 
 pub struct Service {
-    pub(crate) topic: Topic,
+    pub(crate) topic: &'static Topic,
     pub(crate) factory: publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>,
 }
 
 impl Service {
-    pub(crate) fn create(node: &Node, topic: &Topic, window: &Window) -> Result<Self, RunError> {
+    pub(crate) fn create(
+        node: &Node,
+        topic: &'static Topic,
+        window: &Window,
+    ) -> Result<Self, RunError> {
         let sizes = (topic.sizes)(window);
         let factory = builder(node, topic)?
             .enable_safe_overflow(true)
@@ -31,21 +35,15 @@ impl Service {
             .max_nodes(sizes.nodes())
             .create()
             .map_err(|e| RunError::transport(format!("create the topic {}", topic.name), e))?;
-        Ok(Self {
-            topic: *topic,
-            factory,
-        })
+        Ok(Self { topic, factory })
     }
 
     /// Opens a topic, which the supervisor has created.
-    pub fn open(node: &Node, topic: &Topic) -> Result<Self, RunError> {
+    pub fn open(node: &Node, topic: &'static Topic) -> Result<Self, RunError> {
         let factory = builder(node, topic)?
             .open()
             .map_err(|e| RunError::transport(format!("open the topic {}", topic.name), e))?;
-        Ok(Self {
-            topic: *topic,
-            factory,
-        })
+        Ok(Self { topic, factory })
     }
 
     /// Returns whether a process publishes it. A dead one counts until its resources are removed.

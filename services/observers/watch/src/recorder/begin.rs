@@ -6,7 +6,7 @@ use std::{fs, path::Path};
 use gyre_client::{Manifest, RunError, clock};
 use gyre_recording::{Head, Ledger, Positions, RecordingError, next_part, parts};
 
-use crate::recorder::options::{HEALTH, LOG, Options};
+use super::{HEALTH, LOG, Options};
 
 pub(crate) struct Begun {
     pub head: Head,

@@ -9,11 +9,13 @@ use std::{
     time::Duration,
 };
 
-use gyre_recording::{Incoming, LogLine};
+use gyre_recording::{Incoming, LogLine, RecordingError, SplitWriter};
 
 /// The largest number of bytes that wait: twenty seconds of the largest radar's scans at four in a
 /// second, should the disk stand still.
 pub(crate) const LIMIT_BYTES: usize = 128 << 20;
+
+const POLL_PERIOD: Duration = Duration::from_millis(100);
 
 #[derive(Debug)]
 pub(crate) enum Entry {
@@ -79,6 +81,20 @@ impl Receiver {
         let entry = self.entries.recv_timeout(limit)?;
         self.waiting.fetch_sub(entry.bytes(), Ordering::Relaxed);
         Ok(entry)
+    }
+}
+
+/// Writes messages until the queue ends.
+pub(crate) fn write(mut recording: SplitWriter, queue: &Receiver) -> Result<(), RecordingError> {
+    loop {
+        match queue.take(POLL_PERIOD) {
+            Ok(Entry::Message(message)) => recording.add(&message)?,
+            Ok(Entry::Missed(topic, missed)) => recording.file.missed(topic, missed),
+            Ok(Entry::Log(line)) => recording.file.add_log(line)?,
+            Ok(Entry::Health(json, now_ns)) => recording.file.add_health(&json, now_ns)?,
+            Err(RecvTimeoutError::Timeout) => recording.file.flush_if_due()?,
+            Err(RecvTimeoutError::Disconnected) => return recording.file.finish(),
+        }
     }
 }
 

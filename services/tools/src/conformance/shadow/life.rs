@@ -8,8 +8,7 @@ use std::{
 };
 
 use gyre_client::{RunError, Signals};
-use gyre_contract::StageId;
-use gyre_journal::checkpoint;
+use gyre_contract::{StageId, run::REFINEMENT_STATE};
 use gyre_supervise::SuperviseError;
 
 use crate::conformance::{
@@ -103,7 +102,7 @@ impl ShadowProgram {
 /// Copies the state of a run's refinement: a refinement that is restarted or swapped in starts with
 /// the same state.
 fn copy_state(run: &Path, out: &Path) -> Result<(), RunError> {
-    let (from, to) = (checkpoint::path(run), checkpoint::path(out));
+    let [from, to] = [run, out].map(|folder| folder.join(REFINEMENT_STATE));
     gyre_storage::create_folder(to.parent().unwrap_or(out))?;
     match fs::copy(&from, to) {
         // A replaced refinement need not have one.
