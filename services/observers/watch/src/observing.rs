@@ -8,7 +8,7 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws};
-use gyre_client::{Next, Received, Run, RunError};
+use gyre_client::{Next, Observer, Received, Run, RunError};
 use gyre_contract::{Masked, Message, Objects, Pose, PoseHeader, Scan};
 
 use crate::{
@@ -138,13 +138,18 @@ fn follow_pictures<M: Message>(
     let is_wanted = || !view.is_stopping() && layers.iter().any(|layer| view.is_wanted(*layer));
     while !view.is_stopping() {
         let mut drawn: Option<Instant> = None;
-        let failed = follow_topic::<M>(followed, &is_wanted, |message, missed| {
-            view.add_missed(M::TOPIC, missed);
-            if drawn.is_none_or(|drawn| drawn.elapsed() >= PICTURE_INTERVAL) {
-                drawn = Some(Instant::now());
-                picture(view, message);
-            }
-        });
+        let failed = follow_topic(
+            followed,
+            Run::observe::<M>,
+            &is_wanted,
+            |message, missed| {
+                view.add_missed(M::TOPIC, missed);
+                if drawn.is_none_or(|drawn| drawn.elapsed() >= PICTURE_INTERVAL) {
+                    drawn = Some(Instant::now());
+                    picture(view, message);
+                }
+            },
+        );
         if !is_wanted() {
             // A later browser is not shown an old picture.
             for layer in layers {
@@ -159,8 +164,9 @@ fn follow_pictures<M: Message>(
 
 /// Waits for a poll, and follows a topic of the run, if there is one, as long as the topic is
 /// wanted: calls `take` with each message, and with the number of those missed before it.
-pub fn follow_topic<M: Message>(
+pub fn follow_topic<M>(
     followed: &Followed,
+    observe: impl FnOnce(&Run) -> Result<Observer<M>, RunError>,
     is_wanted: &dyn Fn() -> bool,
     mut take: impl FnMut(&Received<M>, u64),
 ) -> Result<(), RunError> {
@@ -169,7 +175,7 @@ pub fn follow_topic<M: Message>(
         return Ok(());
     }
     let followed = Run::open(&followed.out).and_then(|run| {
-        let mut observer = run.observe::<M>()?;
+        let mut observer = observe(&run)?;
         while is_wanted() {
             match observer.next(POLL_INTERVAL)? {
                 Next::Message(message, missed) => take(message, missed),

@@ -1,21 +1,18 @@
 //! The threads that observe the topics that viewers want.
 
 use std::{
-    io,
+    io, iter,
     path::PathBuf,
     sync::Arc,
     thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
-use bytemuck::bytes_of;
 use gyre_client::{Received, Run, clock};
-use gyre_contract::{
-    Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
-};
+use gyre_contract::{Masked, MaskedHeader, Message, Pose, Topic};
 use gyre_recording::{
     LogTail,
-    view::{LOG, POINTS, TRAJECTORY, View, views},
+    view::{LOG, POINTS, TRAJECTORY, View, image_channel, views},
 };
 
 use super::{
@@ -40,84 +37,70 @@ pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHan
         let thread = thread::Builder::new().name("foxglove".to_owned());
         thread.spawn(move || report(&followed, &hub))?
     };
-    Ok(vec![
-        report,
-        follow::<Scan>(followed, hub, PICTURE_INTERVAL, scan)?,
-        follow::<Masked>(followed, hub, PICTURE_INTERVAL, masked)?,
-        follow::<Rotation>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
-        follow::<Motion>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
-        follow::<Refined>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
-        follow::<Pose>(followed, hub, TRAJECTORY_INTERVAL, trajectory)?,
-        follow::<Loop>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
-        follow::<Correction>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
-        follow::<Fix>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
-        follow::<Objects>(followed, hub, PICTURE_INTERVAL, |_, _, _| {})?,
-    ])
+    let is_shown = |topic: &&Topic| {
+        let mut channels = hub.channels.iter();
+        channels.any(|it| it.topic == Some(topic.name))
+    };
+    let topics = gyre_contract::all().filter(is_shown);
+    let threads = topics.map(|topic| follow(followed, hub, topic));
+    iter::once(Ok(report)).chain(threads).collect()
 }
 
-/// Follows a topic; `draw` publishes the views that take long, at most once in an interval.
-fn follow<M: Message>(
+/// Follows a topic. The views that take long are published at most once in an interval.
+fn follow(
     followed: &Arc<Followed>,
     hub: &Arc<Hub>,
-    interval: Duration,
-    draw: fn(&Hub, &RunView, &Received<M>),
+    topic: &'static Topic,
 ) -> io::Result<JoinHandle<()>> {
+    let interval = match topic.name {
+        Pose::TOPIC => TRAJECTORY_INTERVAL,
+        _ => PICTURE_INTERVAL,
+    };
     let (hub, followed) = (Arc::clone(hub), Arc::clone(followed));
-    let thread = thread::Builder::new().name(format!("fox-{}", M::TOPIC));
+    let thread = thread::Builder::new().name(format!("fox-{}", topic.name));
     thread.spawn(move || {
-        let is_wanted = || !followed.view.is_stopping() && hub.wants_topic(M::TOPIC);
+        let is_wanted = || !followed.view.is_stopping() && hub.wants_topic(topic.name);
+        let observe = |run: &Run| run.observe_topic(topic);
         let mut drawn: Option<Instant> = None;
         while !followed.view.is_stopping() {
-            let published = follow_topic::<M>(&followed, &is_wanted, |message, _| {
+            let published = follow_topic(&followed, observe, &is_wanted, |message, _| {
                 let item = message.item();
-                for view in views(M::TOPIC, bytes_of(message.header())) {
+                for view in views(topic.name, message.header_bytes()) {
                     hub.publish(view.channel, item.stamp_ns, view.data);
                 }
-                if M::TOPIC == Pose::TOPIC && hub.is_wanted(LATENCY) {
+                if topic.name == Pose::TOPIC && hub.is_wanted(LATENCY) {
                     hub.publish(LATENCY, item.stamp_ns, latency(item));
                 }
                 if drawn.is_none_or(|drawn| drawn.elapsed() >= interval) {
                     drawn = Some(Instant::now());
-                    draw(&hub, &followed.view, message);
+                    draw(&hub, &followed.view, topic.name, message);
                 }
             });
             if let Err(error) = published {
-                let notice = format!("{} is not shown: {error}.", M::TOPIC);
+                let notice = format!("{} is not shown: {error}.", topic.name);
                 hub.notice.send_replace(notice);
             }
         }
     })
 }
 
-fn scan(hub: &Hub, _: &RunView, message: &Received<Scan>) {
-    image(hub, "/scan", message);
-}
-
-fn masked(hub: &Hub, _: &RunView, message: &Received<Masked>) {
-    image(hub, "/masked", message);
-    let header = message.header();
-    if hub.is_wanted(POINTS)
-        && let Some(points) = header.points(message.values())
-    {
-        let view = View::points(points, header);
-        hub.publish(POINTS, header.item.stamp_ns, view.data);
-    }
-}
-
-/// Publishes the image of a message. One that is too short for its header has none.
-fn image<M: Message>(hub: &Hub, channel: &str, message: &Received<M>) {
-    let (header, stamp_ns) = (bytes_of(message.header()), message.item().stamp_ns);
-    if hub.is_wanted(channel)
-        && let Some(view) = View::image_of(M::TOPIC, header, message.values(), stamp_ns)
+/// Publishes the views that take long. A message that is too short for its header has no image.
+fn draw<M>(hub: &Hub, run: &RunView, topic: &str, message: &Received<M>) {
+    let (header, stamp_ns) = (message.header_bytes(), message.item().stamp_ns);
+    if let Some(channel) = image_channel(topic)
+        && hub.is_wanted(channel)
+        && let Some(view) = View::image_of(topic, header, message.values(), stamp_ns)
     {
         hub.publish(channel, stamp_ns, view.data);
     }
-}
-
-fn trajectory(hub: &Hub, view: &RunView, message: &Received<Pose>) {
-    if hub.is_wanted(TRAJECTORY) {
-        let stamp_ns = message.item().stamp_ns;
-        let view = View::trajectory(view.trajectory().into_iter(), stamp_ns);
+    if topic == Masked::TOPIC && hub.is_wanted(POINTS) {
+        let header: &MaskedHeader = bytemuck::from_bytes(header);
+        if let Some(points) = header.points(message.values()) {
+            hub.publish(POINTS, stamp_ns, View::points(points, header).data);
+        }
+    }
+    if topic == Pose::TOPIC && hub.is_wanted(TRAJECTORY) {
+        let view = View::trajectory(run.trajectory().into_iter(), stamp_ns);
         hub.publish(TRAJECTORY, stamp_ns, view.data);
     }
 }
