@@ -12,52 +12,31 @@ use crate::{
     },
 };
 
-/// An object of a scan, by `objects.csv`.
-struct Row {
-    object: String,
-    /// x, y, length, width and the variances of x and y.
-    values: [f64; 6],
-    speed_mps: f64,
-    moving: bool,
-}
+/// The places of the objects by identity, of each scan that has some.
+type Places = BTreeMap<String, [f64; 2]>;
 
-/// The objects of a run by the times of their scans.
-fn rows(run: &Run) -> BTreeMap<i64, Vec<Row>> {
-    let names = [
-        "stamp_ns", "object", "moving", "vx_m_s", "vy_m_s", "x_m", "y_m", "length_m", "width_m",
-        "cov_xx", "cov_yy",
-    ];
-    let mut scans: BTreeMap<i64, Vec<Row>> = BTreeMap::new();
+/// Returns the places of `objects.csv`, in the order of the scans, as a car sees them whose radar, a
+/// metre ahead of its origin, looks to the left.
+fn expected(run: &Run) -> Vec<Places> {
+    let names = ["stamp_ns", "object", "x_m", "y_m"];
+    let mut scans: BTreeMap<i64, Places> = BTreeMap::new();
     for row in odometry::columns(&run.result("objects.csv"), &names) {
-        let at = |column: usize| row[column].parse::<f64>().unwrap();
-        scans.entry(row[0].parse().unwrap()).or_default().push(Row {
-            object: row[1].clone(),
-            values: [5, 6, 7, 8, 9, 10].map(at),
-            speed_mps: at(3).hypot(at(4)),
-            moving: row[2] == "1",
-        });
+        let [x_m, y_m] = [2, 3].map(|column: usize| row[column].parse::<f64>().unwrap());
+        let places = scans.entry(row[0].parse().unwrap()).or_default();
+        places.insert(row[1].clone(), [1.0 - y_m, x_m]);
     }
-    scans
+    scans.into_values().collect()
 }
 
-/// Asserts that a detection is an object, seen from a car whose radar, a metre ahead of its origin,
-/// looks to the left.
-fn assert_is(detection: &Value, row: &Row) {
-    let [result] = &detection["results"].as_array().unwrap()[..] else {
-        panic!("{detection}");
+fn seen(array: &Value) -> Places {
+    assert_eq!(array["header"]["frame_id"], "odom");
+    let place = |it: &Value| {
+        let at = &it["bbox"]["center"]["position"];
+        let id = it["id"].as_str().unwrap().to_owned();
+        (id, [number(&at["x"]), number(&at["y"])])
     };
-    let class = if row.moving { "moving" } else { "standing" };
-    assert_eq!(result["hypothesis"]["class_id"], class);
-    let (center, size) = (&detection["bbox"]["center"], &detection["bbox"]["size"]);
-    assert_eq!(*center, result["pose"]["pose"]);
-    let (at, of) = (&center["position"], &result["pose"]["covariance"]);
-    let found = [&at["x"], &at["y"], &size["x"], &size["y"], &of[7], &of[0]];
-    let [x_m, y_m, length_m, width_m, cov_xx, cov_yy] = row.values;
-    let expected = [1.0 - y_m, x_m, length_m, width_m, cov_xx, cov_yy];
-    for (found, expected) in found.map(number).into_iter().zip(expected) {
-        assert!((found - expected).abs() < 1e-3, "{found} {expected}");
-    }
-    assert_eq!(number(&size["z"]), 0.0);
+    let detections = array["detections"].as_array().unwrap();
+    detections.iter().map(place).collect()
 }
 
 #[test]
@@ -82,31 +61,20 @@ fn a_node_of_ros_receives_the_objects_of_each_scan_as_detections_and_markers() {
         messages.iter().map(|it| stamp_ns(&it["header"])).collect()
     };
     assert_eq!(stamps(arrays), stamps(&topics["/car/odom"]));
-    let scans = rows(&run);
-    let of_all = scans.values().map(Vec::len).sum::<usize>();
+    let expected = expected(&run);
+    let of_all = expected.iter().map(BTreeMap::len).sum::<usize>();
     assert!(of_all > 20, "{of_all}");
-    let with_objects = arrays.iter().zip(drawn);
-    let mut with_objects =
-        with_objects.filter(|(array, _)| !array["detections"].as_array().unwrap().is_empty());
-    for rows in scans.values() {
-        let (array, drawn) = with_objects.next().unwrap();
-        assert_eq!(array["header"]["frame_id"], "odom");
-        let detections = array["detections"].as_array().unwrap();
-        assert_eq!(detections.len(), rows.len());
-        let markers = drawn["markers"].as_array().unwrap();
-        for row in rows {
-            let detection = detections.iter().find(|it| it["id"] == row.object.as_str());
-            assert_is(detection.unwrap(), row);
+    let pairs = arrays.iter().map(seen).zip(drawn);
+    let pairs: Vec<_> = pairs.filter(|(places, _)| !places.is_empty()).collect();
+    assert_eq!(pairs.len(), expected.len());
+    for ((seen, drawn), expected) in pairs.iter().zip(&expected) {
+        assert!(seen.keys().eq(expected.keys()), "{seen:?} {expected:?}");
+        for (seen, expected) in seen.values().zip(expected.values()) {
+            let is_near = (0..2).all(|axis| (seen[axis] - expected[axis]).abs() < 1e-3);
+            assert!(is_near, "{seen:?} {expected:?}");
         }
-        let arrows = markers.iter().filter(|it| it["ns"] == "velocities");
-        let mut lengths_m: Vec<f64> = arrows.map(|it| number(&it["scale"]["x"])).collect();
-        let moving = rows.iter().filter(|row| row.moving);
-        let mut speeds_mps: Vec<f64> = moving.map(|row| row.speed_mps).collect();
-        lengths_m.sort_by(f64::total_cmp);
-        speeds_mps.sort_by(f64::total_cmp);
-        assert_eq!(lengths_m.len(), speeds_mps.len());
-        let pairs = lengths_m.iter().zip(&speeds_mps);
-        pairs.for_each(|(length, speed)| assert!((length - speed).abs() < 1e-3));
+        let markers = drawn["markers"].as_array().unwrap().iter();
+        let boxes = markers.filter(|it| it["ns"] == "boxes").count();
+        assert_eq!(boxes, expected.len());
     }
-    assert!(with_objects.next().is_none());
 }
