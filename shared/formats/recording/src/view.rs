@@ -358,3 +358,24 @@ pub fn image_channel(topic: &str) -> Option<&'static str> {
     let is_it = |it: &&Channel| it.topic == Some(topic) && matches!(it.shown, Image);
     CHANNELS.iter().find(is_it).map(|it| it.name)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_made_of_fields_that_its_message_has() {
+        for channel in &CHANNELS {
+            let fields = match channel.shown {
+                Place(_, fields) => fields,
+                Frame(_) => POSE,
+                _ => continue,
+            };
+            let structure = channel.topic.and_then(topic).unwrap().structure;
+            let header = vec![0; structure.bytes];
+            for field in fields.iter().filter(|it| !it.is_empty()) {
+                assert!(structure.value(field, &header).is_some(), "{field}");
+            }
+        }
+    }
+}
