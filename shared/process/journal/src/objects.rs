@@ -34,30 +34,3 @@ impl Record for LoggedObjects {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn objects_are_decoded_as_they_were_encoded() {
-        let object = Object {
-            id: 3,
-            y_m: -4.0,
-            velocity_covariance: [0.5, -0.1, 0.6],
-            age: 17,
-            ..Object::default()
-        };
-        let logged = LoggedObjects {
-            seq: 4,
-            scan: 9,
-            stamp_ns: -5,
-            objects: vec![object; 2],
-        };
-        let mut bytes = Vec::new();
-        logged.encode(&mut bytes);
-        assert_eq!(LoggedObjects::decode(&bytes).unwrap(), logged);
-        assert_eq!(LoggedObjects::decode(&bytes[1..]), None);
-        assert_eq!(LoggedObjects::decode(&bytes[..8]), None);
-    }
-}
