@@ -1,5 +1,4 @@
-//! Tests of the messages to a peer in ROS 2 from a run that tracks objects. That detections and
-//! markers have all that the results have is a test of `input::bags`.
+//! Tests of the messages to a peer in ROS 2 from a run that tracks objects.
 
 use std::collections::BTreeMap;
 
@@ -13,19 +12,31 @@ use crate::{
     },
 };
 
-/// Objects by their identities: x and y, m.
+/// The places of the objects by identity, of each scan that has some.
 type Places = BTreeMap<String, [f64; 2]>;
 
-/// The objects of a run by the times of their scans, by `objects.csv`.
-fn rows(run: &Run) -> BTreeMap<i64, Places> {
+/// Returns the places of `objects.csv`, in the order of the scans, as a car sees them whose radar, a
+/// metre ahead of its origin, looks to the left.
+fn expected(run: &Run) -> Vec<Places> {
     let names = ["stamp_ns", "object", "x_m", "y_m"];
     let mut scans: BTreeMap<i64, Places> = BTreeMap::new();
     for row in odometry::columns(&run.result("objects.csv"), &names) {
-        let place = [2, 3].map(|column: usize| row[column].parse().unwrap());
-        let scan = scans.entry(row[0].parse().unwrap()).or_default();
-        scan.insert(row[1].clone(), place);
+        let [x_m, y_m] = [2, 3].map(|column: usize| row[column].parse::<f64>().unwrap());
+        let places = scans.entry(row[0].parse().unwrap()).or_default();
+        places.insert(row[1].clone(), [1.0 - y_m, x_m]);
     }
-    scans
+    scans.into_values().collect()
+}
+
+fn seen(array: &Value) -> Places {
+    assert_eq!(array["header"]["frame_id"], "odom");
+    let place = |it: &Value| {
+        let at = &it["bbox"]["center"]["position"];
+        let id = it["id"].as_str().unwrap().to_owned();
+        (id, [number(&at["x"]), number(&at["y"])])
+    };
+    let detections = array["detections"].as_array().unwrap();
+    detections.iter().map(place).collect()
 }
 
 #[test]
@@ -44,31 +55,26 @@ fn a_node_of_ros_receives_the_objects_of_each_scan_as_detections_and_markers() {
     assert!(said.iter().any(is_whole), "{said:?}");
 
     let (arrays, drawn) = (&topics["/car/objects"], &topics["/car/object_markers"]);
+    assert_eq!(arrays.len(), topics["/car/odom"].len());
     assert_eq!(arrays.len(), drawn.len());
     let stamps = |messages: &[Value]| -> Vec<i64> {
         messages.iter().map(|it| stamp_ns(&it["header"])).collect()
     };
     assert_eq!(stamps(arrays), stamps(&topics["/car/odom"]));
-    let scans = rows(&run);
-    let of_all = scans.values().map(BTreeMap::len).sum::<usize>();
+    let expected = expected(&run);
+    let of_all = expected.iter().map(BTreeMap::len).sum::<usize>();
     assert!(of_all > 20, "{of_all}");
-    let is_empty = |it: &&Value| it["detections"].as_array().unwrap().is_empty();
-    let arrays = arrays.iter().filter(|it| !is_empty(it));
-    let arrays: Vec<&Value> = arrays.collect();
-    assert_eq!(arrays.len(), scans.len());
-    for (array, rows) in arrays.into_iter().zip(scans.values()) {
-        assert_eq!(array["header"]["frame_id"], "odom");
-        let detections = array["detections"].as_array().unwrap();
-        assert_eq!(detections.len(), rows.len());
-        for detection in detections {
-            // From a car whose radar, a metre ahead of its origin, looks to the left.
-            let [x_m, y_m] = rows[detection["id"].as_str().unwrap()];
-            let at = &detection["bbox"]["center"]["position"];
-            let apart = [number(&at["x"]) - (1.0 - y_m), number(&at["y"]) - x_m];
-            assert!(
-                apart.iter().all(|it| it.abs() < 1e-3),
-                "{detection} {rows:?}"
-            );
+    let pairs = arrays.iter().map(seen).zip(drawn);
+    let pairs: Vec<_> = pairs.filter(|(places, _)| !places.is_empty()).collect();
+    assert_eq!(pairs.len(), expected.len());
+    for ((seen, drawn), expected) in pairs.iter().zip(&expected) {
+        assert!(seen.keys().eq(expected.keys()), "{seen:?} {expected:?}");
+        for (seen, expected) in seen.values().zip(expected.values()) {
+            let is_near = (0..2).all(|axis| (seen[axis] - expected[axis]).abs() < 1e-3);
+            assert!(is_near, "{seen:?} {expected:?}");
         }
+        let markers = drawn["markers"].as_array().unwrap().iter();
+        let boxes = markers.filter(|it| it["ns"] == "boxes").count();
+        assert_eq!(boxes, expected.len());
     }
 }

@@ -13,13 +13,14 @@
 use std::{collections::BTreeMap, error::Error, f64::consts::TAU, path::Path, env, fs};
 
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
+use gyre_contract::Object;
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw, OwnedScan};
 use gyre_masking::networks::runtime;
 use gyre_matching::odometry::{Odometry, OdometryConfig};
-use gyre_objects::{Object, ObjectTracker, PlacedScan};
+use gyre_objects::{ObjectTracker, PlacedScan};
 use gyre_results::evaluation::{ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_worlds::{drive::DriveKind, weather::WeatherConfig, Realism, SimulatedDrive, SimulationConfig};
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Matrix2, Point2, Vector2};
 use serde::Deserialize;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -86,13 +87,15 @@ fn track(drive: &[DriveScan]) -> Outcome<Vec<ObjectScan>> {
 /// An object in the frame of the sensor.
 fn seen_from(sensor: &Pose, object: &Object) -> TrackedObject {
     let turn = sensor.rotation.to_rotation_matrix();
+    let [xx, xy, yy] = object.velocity_covariance;
+    let covariance = Matrix2::new(xx, xy, xy, yy);
     TrackedObject {
         id: object.id,
-        position: sensor * object.position,
-        velocity: turn * object.velocity,
-        velocity_covariance: turn.matrix() * object.velocity_covariance * turn.matrix().transpose(),
+        position: sensor * Point2::new(object.x_m, object.y_m),
+        velocity: turn * Vector2::new(object.vx_mps, object.vy_mps),
+        velocity_covariance: turn.matrix() * covariance * turn.matrix().transpose(),
         yaw_rad: object.yaw_rad + turn.angle(),
-        moving: object.moving,
+        moving: object.is_moving(),
     }
 }
 

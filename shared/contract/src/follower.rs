@@ -1,4 +1,4 @@
-//! `loop`, `correction`, `fix`, `objects`: the messages of processes that follow the logs of a run.
+//! `loop`, `correction`, `fix`: the messages of processes that follow the logs of a run with SLAM.
 
 use gyre_geometry::{Pose as PlanarPose, UncertainMotion, covariance, pose};
 
@@ -137,88 +137,5 @@ impl FixHeader {
     pub fn pose(&self) -> Option<PlanarPose> {
         let is_known = self.status != fix_status::LOST;
         is_known.then(|| pose(self.x_m, self.y_m, self.yaw_rad))
-    }
-}
-
-/// Objects that a message lists, at most: those nearest to the vehicle. The others are counted, and
-/// in `journal/objects.log`.
-pub const MAX_LISTED: usize = 64;
-const SIZE: Bounds = Bounds::Within(0.0, 1e3);
-
-wire! {
-    /// The objects, in the odometry frame: the frame of the first scan.
-    pub struct ObjectsHeader = "gyre_objects_header_v3" {
-        /// The item of the scan's pose.
-        pub item: Item,
-        /// Pose of the sensor at the scan's time: x forward, y to the left, yaw counter-clockwise,
-        /// in (-pi, pi].
-        pub x_m: f64 [REACH],
-        pub y_m: f64 [REACH],
-        pub yaw_rad: f64 [Bounds::HalfTurn],
-        /// Objects that move, or did and stand now.
-        pub objects: u64,
-        pub moving: u64,
-        pub listed: u64,
-        /// The objects nearest to the vehicle, the nearest first; zero beyond `listed`.
-        pub list: [ListedObject; MAX_LISTED] [Bounds::CountedBy("listed")],
-    }
-
-    pub struct ListedObject = "gyre_listed_object_v1" {
-        /// The identity: counted from 1, and given to no other object of the run.
-        pub id: u64,
-        /// The centre, and the heading in (-pi, pi].
-        pub x_m: f64 [REACH],
-        pub y_m: f64 [REACH],
-        pub yaw_rad: f64 [Bounds::HalfTurn],
-        /// The velocity over ground.
-        pub vx_mps: f64 [Bounds::Finite],
-        pub vy_mps: f64 [Bounds::Finite],
-        /// Along the heading, and across it.
-        pub length_m: f64 [SIZE],
-        pub width_m: f64 [SIZE],
-        /// Covariance of the centre: xx, xy and yy, m².
-        pub position_covariance: [f64; 3] [Bounds::Finite],
-        /// Covariance of the velocity: xx, xy and yy, (m/s)².
-        pub velocity_covariance: [f64; 3] [Bounds::Finite],
-        /// 1 if it moves, 0 if its speed is not significantly above a standing object's.
-        pub moving: u32,
-        /// Scans since it was first seen, that one included.
-        pub age: u32,
-    }
-}
-
-impl Header for ObjectsHeader {
-    fn check_content(&self, _: &[u8], _: &Limits) -> Result<(), String> {
-        let fits = self.moving <= self.objects;
-        field("moving", require(fits, self.moving, "at most objects"))?;
-        let fits = self.listed == self.objects.min(MAX_LISTED as u64);
-        let expected = format_args!("objects, at most {MAX_LISTED}");
-        field("listed", require(fits, self.listed, expected))
-    }
-
-    fn words(&self, _: &[u8]) -> String {
-        let mut text = format!("{} objects, {} move", self.objects, self.moving);
-        for object in self.list().iter().filter(|object| object.is_moving()) {
-            let place = place(object.x_m, object.y_m, object.yaw_rad);
-            let (id, speed_mps) = (object.id, object.speed_mps());
-            text += &format!("; {id}: {place}, {speed_mps:.1} m/s");
-        }
-        text
-    }
-}
-
-impl ObjectsHeader {
-    pub fn list(&self) -> &[ListedObject] {
-        &self.list[..(self.listed as usize).min(MAX_LISTED)]
-    }
-}
-
-impl ListedObject {
-    pub fn is_moving(&self) -> bool {
-        self.moving != 0
-    }
-
-    pub fn speed_mps(&self) -> f64 {
-        self.vx_mps.hypot(self.vy_mps)
     }
 }

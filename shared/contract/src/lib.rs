@@ -15,6 +15,7 @@ mod masked;
 mod message;
 mod motion;
 mod named;
+mod object;
 mod pose;
 mod refinement;
 pub mod run;
@@ -25,15 +26,14 @@ mod topics;
 pub mod wire;
 
 pub use basis::{Basis, WitnessCounts};
-pub use follower::{
-    CorrectionHeader, FixHeader, ListedObject, LoopHeader, MAX_LISTED, ObjectsHeader, fix_status,
-};
+pub use follower::{CorrectionHeader, FixHeader, LoopHeader, fix_status};
 pub use intake::IntakeHeader;
 pub use item::{FollowerId, Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window};
 pub use masked::{MaskedHeader, MaskedParts, Pair, mask_kind};
 pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender, Topic, Use, WireType};
 pub use motion::{MotionEstimate, MotionHeader, RotationEstimate, RotationHeader};
+pub use object::{Drawing, MAX_LISTED, Object, ObjectsHeader};
 pub use pose::{PoseHeader, compose};
 pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 pub use sample_rates::{SampleHealth, SampleRates};

@@ -5,13 +5,14 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
-    follower::{CorrectionHeader, FixHeader, LoopHeader, ObjectsHeader},
+    follower::{CorrectionHeader, FixHeader, LoopHeader},
     intake::IntakeHeader,
     item::{FollowerId, StageId},
     limits::{History, Limits, TopicSizes, Window},
     masked::MaskedHeader,
     message::{ByteBlock, FloatBlock, Message, Sender, Topic, Use},
     motion::{MotionHeader, RotationHeader},
+    object::ObjectsHeader,
     pose::PoseHeader,
     scan::ScanHeader,
 };

@@ -28,7 +28,7 @@ pub enum Profile {
 /// The direction of the chirps, which determines the sign of the Doppler shift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Chirp {
-    /// Approaching objects are measured too near.
+    /// Approaching targets are measured too near.
     Rising,
     /// Rising in even azimuths and falling in odd ones, as recorded in each azimuth's metadata.
     Alternating,
@@ -68,7 +68,7 @@ pub struct Receiver {
     /// Range below which power falls with the square only, metres: an FMCW receiver filters low
     /// beat frequencies.
     pub filter_m: f64,
-    /// Range below which power rises with the square, metres: near objects lie below the beam of
+    /// Range below which power rises with the square, metres: near targets lie below the beam of
     /// the antenna on the roof.
     pub near_m: f64,
     pub full_scale: f32,

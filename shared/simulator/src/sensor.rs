@@ -161,7 +161,7 @@ impl Sensor {
             let off_rad = azimuth_pose.beam.perp(&ray) / azimuth_pose.beam.dot(&ray) + jitter_rad;
             let amplitude = echo.amplitude * self.antenna.gain(off_rad);
             let approach_mps = (azimuth_pose.velocity - echo.velocity).dot(&ray) / range_m;
-            // With a rising chirp approaching objects are measured too near.
+            // With a rising chirp approaching targets are measured too near.
             let bin = self.sampling.bin(range_m - doppler_s * approach_mps);
             if self.is_exact {
                 self.spectrum.add_power(bin, (amplitude * amplitude) as f32);

@@ -1,8 +1,6 @@
 //! The layers that a browser asks for, and the messages to it in JSON.
 
-use gyre_contract::{
-    ListedObject, ObjectsHeader, PoseHeader, SampleHealth, WitnessCounts, outcome,
-};
+use gyre_contract::{Object, ObjectsHeader, PoseHeader, SampleHealth, WitnessCounts, outcome};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -87,7 +85,7 @@ pub struct RunCounts {
 /// Returns the objects at the time of a scan, in the frame of the first one: x, y (m), yaw (rad) of
 /// each centre, the velocity along x and y (m/s), length and width (m).
 pub fn objects(header: &ObjectsHeader) -> Value {
-    let object = |object: &ListedObject| {
+    let object = |object: &Object| {
         json!({
             "id": object.id,
             "pose": [object.x_m, object.y_m, object.yaw_rad],

@@ -166,7 +166,7 @@ fn follow_pictures<M: Message>(
 /// wanted: calls `take` with each message, and with the number of those missed before it.
 pub fn follow_topic<M>(
     followed: &Followed,
-    observe: impl Fn(&Run) -> Result<Observer<M>, RunError>,
+    observe: impl FnOnce(&Run) -> Result<Observer<M>, RunError>,
     is_wanted: &dyn Fn() -> bool,
     mut take: impl FnMut(&Received<M>, u64),
 ) -> Result<(), RunError> {

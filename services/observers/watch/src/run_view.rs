@@ -322,7 +322,7 @@ fn send_json(channel: &Newest, message: &impl Serialize) {
 
 #[cfg(test)]
 mod tests {
-    use gyre_contract::{Item, ListedObject, MaskedHeader, StageId};
+    use gyre_contract::{Item, MaskedHeader, Object, StageId};
     use gyre_geometry::SparsePoint;
     use serde_json::Value;
 
@@ -414,13 +414,13 @@ mod tests {
             listed: 1,
             ..ObjectsHeader::default()
         };
-        header.list[0] = ListedObject {
+        header.list[0] = Object {
             id: 5,
             x_m: 20.0,
             vy_mps: -3.0,
             length_m: 4.4,
             moving: 1,
-            ..ListedObject::default()
+            ..Object::default()
         };
         view.set_objects(&header);
         let sent = newest(view.updates.of(Layer::Objects));

@@ -2,20 +2,18 @@
 //! `journal/objects.log`. A restarted process works through the scans from the first one, since an
 //! identity can be as old as the run, and appends the records that the log lacks.
 
-use gyre_contract::{Item, MAX_LISTED, Objects, ObjectsHeader, run::StageCounters};
+use gyre_contract::{Item, MAX_LISTED, Object, Objects, ObjectsHeader, run::StageCounters};
 use gyre_geometry::xy_yaw;
-use gyre_journal::{
-    objects::{LoggedObjects, listed},
-    scans::LoggedScan,
-};
+use gyre_journal::{objects::LoggedObjects, scans::LoggedScan};
 use gyre_masking::MaskingConfig;
-use gyre_objects::{Object, ObjectTracker, PlacedScan};
+use gyre_objects::{ObjectTracker, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
 use gyre_stage::{
     Follower, Launch,
     follower::{self, Progress, Step},
 };
 use gyre_transport::{RunError, services::LogId};
+use nalgebra::Vector2;
 
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
@@ -97,16 +95,16 @@ fn header(scan: &LoggedScan, objects: &[Object]) -> ObjectsHeader {
         y_m,
         yaw_rad,
         objects: objects.len() as u64,
-        moving: objects.iter().filter(|object| object.moving).count() as u64,
+        moving: objects.iter().filter(|it| it.is_moving()).count() as u64,
         listed: objects.len().min(MAX_LISTED) as u64,
         ..ObjectsHeader::default()
     };
-    let away_m = |object: &&Object| (object.position.coords - scan.pose.translation.vector).norm();
-    let mut nearest: Vec<&Object> = objects.iter().collect();
+    let here = scan.pose.translation.vector;
+    let away_m = |it: &Object| (Vector2::new(it.x_m, it.y_m) - here).norm();
+    let mut nearest = objects.to_vec();
     nearest.sort_by(|a, b| away_m(a).total_cmp(&away_m(b)));
-    for (place, object) in header.list.iter_mut().zip(nearest) {
-        *place = listed(object);
-    }
+    nearest.truncate(MAX_LISTED);
+    header.list[..nearest.len()].copy_from_slice(&nearest);
     header
 }
 

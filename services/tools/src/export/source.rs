@@ -11,15 +11,12 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_contract::{
-    Correction, CorrectionHeader, ListedObject, Message, Objects, ObjectsHeader, Pose as PoseTopic,
+    Correction, CorrectionHeader, Message, Object, Objects, ObjectsHeader, Pose as PoseTopic,
     PoseHeader, flag,
 };
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
 use gyre_geometry::{LostAzimuths, Pose};
-use gyre_journal::{
-    self as journal,
-    objects::{LoggedObjects, listed},
-};
+use gyre_journal::{self as journal, objects::LoggedObjects};
 use gyre_radar::Trajectory;
 use gyre_recording::{
     Recording,
@@ -45,7 +42,7 @@ pub struct Place {
     /// The pose of the odometry frame in the map frame, with SLAM.
     pub map_from_odometry: Option<Pose>,
     /// The objects, of a run that tracks them; `None` where they are not known.
-    pub objects: Option<Vec<ListedObject>>,
+    pub objects: Option<Vec<Object>>,
 }
 
 impl Place {
@@ -97,8 +94,8 @@ impl Source {
             let near = |it: &Trajectory| it.near(stamp_ns, Trajectory::ROUNDING_NS);
             let in_map: Option<Pose> = corrected.as_ref().and_then(near);
             let inverse = pose.pose().motion.inverse();
-            let objects: Option<Vec<ListedObject>> = match seq < tracked.len() {
-                true => Some(tracked.read(seq)?.objects.iter().map(listed).collect()),
+            let objects: Option<Vec<Object>> = match seq < tracked.len() {
+                true => Some(tracked.read(seq)?.objects),
                 false => None,
             };
             Ok(Place {

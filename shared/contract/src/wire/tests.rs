@@ -4,8 +4,8 @@ use bytemuck::Zeroable;
 use gyre_geometry::samples::Sample;
 
 use crate::{
-    ByteBlock, Correction, CorrectionHeader, Fix, FixHeader, FloatBlock, Item, Limits,
-    ListedObject, Loop, LoopHeader, Masked, MaskedHeader, Message, Motion, MotionHeader, Objects,
+    ByteBlock, Correction, CorrectionHeader, Fix, FixHeader, FloatBlock, Item, Limits, Loop,
+    LoopHeader, Masked, MaskedHeader, Message, Motion, MotionHeader, Object, Objects,
     ObjectsHeader, Pose, PoseHeader, Rotation, RotationHeader, Scan, ScanHeader, flag,
     wire::Described,
 };
@@ -113,12 +113,12 @@ fn a_header_is_finite_and_within_its_bounds() {
         "correlation is NaN": |it| it.correlation = f64::NAN,
         "status is 4": |it| it.status = 4,
     }
-    let car = ListedObject {
+    let car = Object {
         x_m: 20.0,
         yaw_rad: 3.0,
         length_m: 4.4,
         width_m: 1.9,
-        ..ListedObject::default()
+        ..Object::default()
     };
     let mut header = ObjectsHeader {
         objects: 2,

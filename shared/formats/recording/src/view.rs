@@ -16,9 +16,8 @@ use foxglove::{
     },
 };
 use gyre_contract::{
-    Correction, CorrectionHeader, Fix, FixHeader, Item, ListedObject, Loop, LoopHeader, Masked,
-    MaskedHeader, Message, Motion, MotionHeader, Objects, ObjectsHeader, PoseHeader, Refined,
-    Rotation, RotationHeader, Scan,
+    Correction, Drawing, Fix, FixHeader, Item, Loop, Masked, MaskedHeader, Message, Motion,
+    Objects, ObjectsHeader, PoseHeader, Refined, Rotation, Scan, topic, wire::Number,
 };
 use gyre_geometry::SparsePoint;
 
@@ -34,9 +33,8 @@ const ODOMETRY: &str = "odometry";
 const RADAR: &str = "radar";
 /// The frame of the scan before, for motions.
 const PREVIOUS: &str = "previous_scan";
-/// Display height of objects, m: a radar in the plane does not measure it.
-const OBJECT_HEIGHT_M: f64 = 1.6;
 const ARROW_HEAD_M: f64 = 1.0;
+const POSES: &str = gyre_contract::Pose::TOPIC;
 pub const LOG: &str = "/log";
 pub const TRAJECTORY: &str = "/trajectory";
 pub const POINTS: &str = "/points";
@@ -64,31 +62,85 @@ pub struct Channel {
     pub topic: Option<&'static str>,
     pub name: &'static str,
     pub schema: fn() -> Option<Schema>,
+    shown: Shown,
 }
+
+/// The part of a message that a channel shows.
+enum Shown {
+    Image,
+    /// The points, a trajectory, or a line of the log: see [`View`].
+    Apart,
+    /// A place in a frame, by the fields of its x, y and yaw. A field without a name is zero.
+    Place(&'static str, [&'static str; 3]),
+    /// The second frame, whose pose a message has, in the first.
+    Frame([&'static str; 2]),
+    Objects,
+}
+use Shown::{Apart, Frame, Image, Place};
+
+const POSE: [&str; 3] = ["x_m", "y_m", "yaw_rad"];
+const MOTION: [&str; 3] = ["motion.x_m", "motion.y_m", "motion.yaw_rad"];
+const TURN: [&str; 3] = ["", "", "rotation.angle_rad"];
 
 /// All channels, in the order of the stream.
 pub const CHANNELS: [Channel; 14] = [
-    channel::<RawImage>(Some(Scan::TOPIC), "/scan"),
-    channel::<RawImage>(Some(Masked::TOPIC), "/masked"),
-    channel::<PointCloud>(Some(Masked::TOPIC), POINTS),
-    channel::<PoseInFrame>(Some(Rotation::TOPIC), "/rotation"),
-    channel::<PoseInFrame>(Some(Motion::TOPIC), "/motion"),
-    channel::<PoseInFrame>(Some(Refined::TOPIC), "/refined"),
-    channel::<PoseInFrame>(Some(gyre_contract::Pose::TOPIC), "/pose"),
-    channel::<FrameTransform>(Some(gyre_contract::Pose::TOPIC), "/tf"),
-    channel::<PosesInFrame>(Some(gyre_contract::Pose::TOPIC), TRAJECTORY),
-    channel::<PoseInFrame>(Some(Loop::TOPIC), "/loop"),
-    channel::<FrameTransform>(Some(Correction::TOPIC), "/correction"),
-    channel::<PoseInFrame>(Some(Fix::TOPIC), "/fix"),
-    channel::<SceneUpdate>(Some(Objects::TOPIC), "/objects"),
-    channel::<Log>(None, LOG),
+    channel::<RawImage>(Some(Scan::TOPIC), "/scan", Image),
+    channel::<RawImage>(Some(Masked::TOPIC), "/masked", Image),
+    channel::<PointCloud>(Some(Masked::TOPIC), POINTS, Apart),
+    channel::<PoseInFrame>(Some(Rotation::TOPIC), "/rotation", Place(PREVIOUS, TURN)),
+    channel::<PoseInFrame>(Some(Motion::TOPIC), "/motion", Place(PREVIOUS, MOTION)),
+    channel::<PoseInFrame>(Some(Refined::TOPIC), "/refined", Place(PREVIOUS, MOTION)),
+    channel::<PoseInFrame>(Some(POSES), "/pose", Place(ODOMETRY, POSE)),
+    channel::<FrameTransform>(Some(POSES), "/tf", Frame([ODOMETRY, RADAR])),
+    channel::<PosesInFrame>(Some(POSES), TRAJECTORY, Apart),
+    channel::<PoseInFrame>(Some(Loop::TOPIC), "/loop", Place("earlier_keyframe", POSE)),
+    channel::<FrameTransform>(
+        Some(Correction::TOPIC),
+        "/correction",
+        Frame(["map", ODOMETRY]),
+    ),
+    channel::<PoseInFrame>(Some(Fix::TOPIC), "/fix", Place("earlier_map", POSE)),
+    channel::<SceneUpdate>(Some(Objects::TOPIC), "/objects", Shown::Objects),
+    channel::<Log>(None, LOG, Apart),
 ];
 
-const fn channel<M: Encode>(topic: Option<&'static str>, name: &'static str) -> Channel {
+const fn channel<M: Encode>(
+    topic: Option<&'static str>,
+    name: &'static str,
+    shown: Shown,
+) -> Channel {
     Channel {
         topic,
         name,
         schema: M::get_schema,
+        shown,
+    }
+}
+
+impl Channel {
+    fn view(&self, header: &[u8]) -> Option<View> {
+        let structure = topic(self.topic?)?.structure;
+        if header.len() != structure.bytes {
+            return None;
+        }
+        if self.topic == Some(Fix::TOPIC) {
+            // A lost one has no place.
+            read::<FixHeader>(header)?.pose()?;
+        }
+        let item: Item = read(header.get(..size_of::<Item>())?)?;
+        let place = |fields: [&str; 3]| {
+            fields.map(|field| {
+                let value = structure.value(field, header);
+                let number = value.and_then(|it| it.number());
+                number.map_or(0.0, Number::as_f64)
+            })
+        };
+        match self.shown {
+            Image | Apart => None,
+            Place(frame, fields) => Some(in_frame(self.name, frame, &item, place(fields))),
+            Frame(frames) => Some(transform(self.name, frames, &item, place(POSE))),
+            Shown::Objects => Some(objects(self.name, &read(header)?)),
+        }
     }
 }
 
@@ -180,45 +232,8 @@ impl View {
 
 /// Returns what viewers draw of a message beside its image, its points and the trajectory.
 pub fn views(topic: &str, header: &[u8]) -> Vec<View> {
-    views_of(topic, header).unwrap_or_default()
-}
-
-fn views_of(topic: &str, header: &[u8]) -> Option<Vec<View>> {
-    Some(match topic {
-        Rotation::TOPIC => {
-            let it: RotationHeader = read(header)?;
-            let place = [0.0, 0.0, it.rotation.angle_rad];
-            vec![in_frame("/rotation", PREVIOUS, &it.item, place)]
-        }
-        Motion::TOPIC => vec![motion("/motion", &read(header)?)],
-        Refined::TOPIC => vec![motion("/refined", &read(header)?)],
-        gyre_contract::Pose::TOPIC => {
-            let it: PoseHeader = read(header)?;
-            let place = [it.x_m, it.y_m, it.yaw_rad];
-            vec![
-                in_frame("/pose", ODOMETRY, &it.item, place),
-                transform("/tf", [ODOMETRY, RADAR], &it.item, place),
-            ]
-        }
-        Loop::TOPIC => {
-            let it: LoopHeader = read(header)?;
-            let place = [it.x_m, it.y_m, it.yaw_rad];
-            vec![in_frame("/loop", "earlier_keyframe", &it.item, place)]
-        }
-        Correction::TOPIC => {
-            let it: CorrectionHeader = read(header)?;
-            let place = [it.x_m, it.y_m, it.yaw_rad];
-            vec![transform("/correction", ["map", ODOMETRY], &it.item, place)]
-        }
-        Fix::TOPIC => {
-            let it: FixHeader = read(header)?;
-            it.pose()?;
-            let place = [it.x_m, it.y_m, it.yaw_rad];
-            vec![in_frame("/fix", "earlier_map", &it.item, place)]
-        }
-        Objects::TOPIC => vec![objects(&read(header)?)],
-        _ => return None,
-    })
+    let channels = CHANNELS.iter().filter(|it| it.topic == Some(topic));
+    channels.filter_map(|it| it.view(header)).collect()
 }
 
 #[derive(Default)]
@@ -231,7 +246,7 @@ pub(crate) struct Recent {
 impl Recent {
     /// Adds a message if it is a pose, and returns the trajectory if it is due.
     pub fn add(&mut self, topic: &str, header: &[u8]) -> Option<View> {
-        let header: PoseHeader = (topic == gyre_contract::Pose::TOPIC).then(|| read(header))??;
+        let header: PoseHeader = (topic == POSES).then(|| read(header))??;
         if self.places.len() == RECENT {
             self.places.pop_front();
         }
@@ -246,80 +261,54 @@ impl Recent {
     }
 }
 
-fn motion(channel: &'static str, header: &MotionHeader) -> View {
-    let motion = &header.motion;
-    let place = [motion.x_m, motion.y_m, motion.yaw_rad];
-    in_frame(channel, PREVIOUS, &header.item, place)
-}
-
 /// Returns the objects as one entity, which replaces the entity of the scan before.
-fn objects(header: &ObjectsHeader) -> View {
-    let listed = header.list();
-    let moving = listed.iter().filter(|it| it.is_moving());
-    let entity = SceneEntity {
+fn objects(channel: &'static str, header: &ObjectsHeader) -> View {
+    let mut entity = SceneEntity {
         timestamp: Some(timestamp(header.item.stamp_ns)),
         frame_id: ODOMETRY.to_owned(),
         id: Objects::TOPIC.to_owned(),
-        cubes: listed.iter().map(cube).collect(),
-        arrows: moving.map(arrow).collect(),
-        texts: listed.iter().map(name).collect(),
         ..SceneEntity::default()
     };
+    for object in header.list() {
+        let Drawing {
+            sides_m: [x, y, z],
+            colour: [r, g, b],
+            label,
+            arrow_m,
+        } = object.drawing();
+        let colour = |a: f64| Some(Color { r, g, b, a });
+        let lifted = |yaw_rad: f64, height_m: f64| {
+            let mut pose = pose([object.x_m, object.y_m, yaw_rad]);
+            pose.position.as_mut()?.z = height_m;
+            Some(pose)
+        };
+        entity.cubes.push(CubePrimitive {
+            pose: lifted(object.yaw_rad, 0.5 * z),
+            size: Some(Vector3 { x, y, z }),
+            color: colour(Drawing::OPACITY),
+        });
+        entity.arrows.extend(arrow_m.map(|way_m| ArrowPrimitive {
+            pose: lifted(object.vy_mps.atan2(object.vx_mps), z),
+            shaft_length: (way_m - ARROW_HEAD_M).max(0.0),
+            shaft_diameter: 0.3,
+            head_length: ARROW_HEAD_M.min(way_m),
+            head_diameter: Drawing::ARROW_M,
+            color: colour(1.0),
+        }));
+        entity.texts.push(TextPrimitive {
+            pose: lifted(0.0, z + 1.0),
+            billboard: true,
+            font_size: Drawing::LETTER_M,
+            scale_invariant: false,
+            color: colour(1.0),
+            text: label,
+        });
+    }
     let message = SceneUpdate {
         deletions: Vec::new(),
         entities: vec![entity],
     };
-    View::of("/objects", &message)
-}
-
-fn cube(object: &ListedObject) -> CubePrimitive {
-    CubePrimitive {
-        pose: lifted(object, object.yaw_rad, 0.5 * OBJECT_HEIGHT_M),
-        size: Some(Vector3 {
-            x: object.length_m,
-            y: object.width_m,
-            z: OBJECT_HEIGHT_M,
-        }),
-        color: Some(object_colour(object, 0.5)),
-    }
-}
-
-fn arrow(object: &ListedObject) -> ArrowPrimitive {
-    let (way_m, heading_rad) = (object.speed_mps(), object.vy_mps.atan2(object.vx_mps));
-    ArrowPrimitive {
-        pose: lifted(object, heading_rad, OBJECT_HEIGHT_M),
-        shaft_length: (way_m - ARROW_HEAD_M).max(0.0),
-        shaft_diameter: 0.3,
-        head_length: ARROW_HEAD_M.min(way_m),
-        head_diameter: 0.9,
-        color: Some(object_colour(object, 1.0)),
-    }
-}
-
-fn name(object: &ListedObject) -> TextPrimitive {
-    TextPrimitive {
-        pose: lifted(object, 0.0, OBJECT_HEIGHT_M + 1.0),
-        billboard: true,
-        font_size: 1.2,
-        scale_invariant: false,
-        color: Some(object_colour(object, 1.0)),
-        text: object.id.to_string(),
-    }
-}
-
-/// Orange if it moves, grey if it stands.
-fn object_colour(object: &ListedObject, a: f64) -> Color {
-    let [r, g, b] = match object.is_moving() {
-        true => [1.0, 0.55, 0.1],
-        false => [0.6, 0.65, 0.7],
-    };
-    Color { r, g, b, a }
-}
-
-fn lifted(object: &ListedObject, yaw_rad: f64, height_m: f64) -> Option<Pose> {
-    let mut pose = pose([object.x_m, object.y_m, yaw_rad]);
-    pose.position.as_mut()?.z = height_m;
-    Some(pose)
+    View::of(channel, &message)
 }
 
 fn in_frame(channel: &'static str, frame: &str, item: &Item, place: [f64; 3]) -> View {
@@ -365,10 +354,28 @@ fn timestamp(ns: i64) -> Timestamp {
     Timestamp::new(seconds, (ns % 1_000_000_000) as u32)
 }
 
-pub(crate) fn image_channel(topic: &str) -> Option<&'static str> {
-    match topic {
-        Scan::TOPIC => Some("/scan"),
-        Masked::TOPIC => Some("/masked"),
-        _ => None,
+pub fn image_channel(topic: &str) -> Option<&'static str> {
+    let is_it = |it: &&Channel| it.topic == Some(topic) && matches!(it.shown, Image);
+    CHANNELS.iter().find(is_it).map(|it| it.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_made_of_fields_that_its_message_has() {
+        for channel in &CHANNELS {
+            let fields = match channel.shown {
+                Place(_, fields) => fields,
+                Frame(_) => POSE,
+                _ => continue,
+            };
+            let structure = channel.topic.and_then(topic).unwrap().structure;
+            let header = vec![0; structure.bytes];
+            for field in fields.iter().filter(|it| !it.is_empty()) {
+                assert!(structure.value(field, &header).is_some(), "{field}");
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! Both are in the frame `odom`: the vehicle's frame at the first scan. Gyre's objects are in the
 //! radar's frame, so they are moved and turned by the [`Mounting`].
 
-use gyre_contract::ListedObject;
+use gyre_contract::{Drawing, Object};
 use gyre_geometry::{Pose, pose as planar};
 use nalgebra::{Matrix2, Vector2};
 
@@ -21,22 +21,15 @@ const MOVING: &str = "moving";
 /// The class of an object that moved, and stands now.
 const STANDING: &str = "standing";
 
-/// Height for drawing objects, m: a radar in the plane does not measure it.
-const DRAWN_HEIGHT_M: f64 = 1.6;
-/// Diameter of an arrow's head, m.
-const ARROW_M: f64 = 0.9;
-/// Height of a letter, m.
-const LETTER_M: f64 = 1.2;
-
 /// Returns the objects of a scan as detections of the class `moving` or `standing`.
 ///
 /// The covariance of a pose is the covariance of the centre along the axes of `odom`. The heading
 /// has none in Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`].
 /// Boxes have no height, for the same reason.
-pub fn detections(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> Detection3DArray {
+pub fn detections(stamp_ns: i64, vehicle: &Vehicle, objects: &[Object]) -> Detection3DArray {
     let mounting = &vehicle.mounting;
     let header = Header::new(stamp_ns, &vehicle.frames.odom);
-    let detection = |object: &ListedObject| {
+    let detection = |object: &Object| {
         let pose = frames::pose(&place(mounting, object));
         let class_id = if object.is_moving() { MOVING } else { STANDING };
         let covariance = covariance(mounting, object);
@@ -47,11 +40,11 @@ pub fn detections(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) ->
             },
             pose: PoseWithCovariance { pose, covariance },
         };
-        let (center, size) = (pose, size(object, 0.0));
+        let size = Vector3::new(object.length_m, object.width_m, 0.0);
         Detection3D {
             header: header.clone(),
             results: vec![result],
-            bbox: BoundingBox3D { center, size },
+            bbox: BoundingBox3D { center: pose, size },
             id: object.id.to_string(),
         }
     };
@@ -64,7 +57,7 @@ pub fn detections(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) ->
 /// Returns the objects of a scan as shapes: a box of 1.6 m height, the displacement of a second as
 /// an arrow if the object moves, and the identity as a text. The shapes of the scan before are
 /// removed.
-pub fn markers(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> MarkerArray {
+pub fn markers(stamp_ns: i64, vehicle: &Vehicle, objects: &[Object]) -> MarkerArray {
     let mounting = &vehicle.mounting;
     let header = Header::new(stamp_ns, &vehicle.frames.odom);
     let mut markers = vec![Marker {
@@ -73,6 +66,13 @@ pub fn markers(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> Ma
         ..Marker::default()
     }];
     for (object, id) in objects.iter().zip(0..) {
+        let Drawing {
+            sides_m: [length_m, width_m, height_m],
+            colour: [r, g, b],
+            label,
+            arrow_m,
+        } = object.drawing();
+        let [r, g, b] = [r, g, b].map(|part| part as f32);
         // The action is `ADD`, the default.
         let shape = |ns: &str, r#type, pose, scale, opacity| Marker {
             header: header.clone(),
@@ -81,42 +81,43 @@ pub fn markers(stamp_ns: i64, vehicle: &Vehicle, objects: &[ListedObject]) -> Ma
             r#type,
             pose,
             scale,
-            color: colour(object, opacity),
+            color: ColorRGBA {
+                r,
+                g,
+                b,
+                a: opacity,
+            },
             ..Marker::default()
         };
         let place = place(mounting, object);
-        let middle = lifted(&place, 0.5 * DRAWN_HEIGHT_M);
-        let sides = size(object, DRAWN_HEIGHT_M);
-        markers.push(shape("boxes", CUBE, middle, sides, 0.5));
-        let above = lifted(&place, DRAWN_HEIGHT_M + LETTER_M);
-        let letter = Vector3::new(0.0, 0.0, LETTER_M);
+        let middle = lifted(&place, 0.5 * height_m);
+        let sides = Vector3::new(length_m, width_m, height_m);
+        markers.push(shape("boxes", CUBE, middle, sides, Drawing::OPACITY as f32));
+        let above = lifted(&place, height_m + Drawing::LETTER_M);
+        let letter = Vector3::new(0.0, 0.0, Drawing::LETTER_M);
         markers.push(Marker {
-            text: object.id.to_string(),
+            text: label,
             ..shape("identities", TEXT_VIEW_FACING, above, letter, 1.0)
         });
-        if object.is_moving() {
+        if let Some(arrow_m) = arrow_m {
             let at = place.translation.vector;
             let velocity = mounting.radar().rotation * Vector2::new(object.vx_mps, object.vy_mps);
             let ahead = planar(at.x, at.y, velocity.y.atan2(velocity.x));
-            let (ahead, length) = (lifted(&ahead, DRAWN_HEIGHT_M), object.speed_mps());
-            let sides = Vector3::new(length, ARROW_M, ARROW_M);
-            markers.push(shape("velocities", ARROW, ahead, sides, 1.0));
+            let sides = Vector3::new(arrow_m, Drawing::ARROW_M, Drawing::ARROW_M);
+            markers.push(shape(
+                "velocities",
+                ARROW,
+                lifted(&ahead, height_m),
+                sides,
+                1.0,
+            ));
         }
     }
     MarkerArray { markers }
 }
 
-/// Orange if it moves, grey if it stands, as in Gyre's own views.
-fn colour(object: &ListedObject, a: f32) -> ColorRGBA {
-    let [r, g, b] = match object.is_moving() {
-        true => [1.0, 0.55, 0.1],
-        false => [0.6, 0.65, 0.7],
-    };
-    ColorRGBA { r, g, b, a }
-}
-
 /// Returns the centre and the heading of an object in the vehicle's frame at the first scan.
-fn place(mounting: &Mounting, object: &ListedObject) -> Pose {
+fn place(mounting: &Mounting, object: &Object) -> Pose {
     mounting.radar() * planar(object.x_m, object.y_m, object.yaw_rad)
 }
 
@@ -126,12 +127,8 @@ fn lifted(place: &Pose, height_m: f64) -> geometry_msgs::Pose {
     pose
 }
 
-fn size(object: &ListedObject, height_m: f64) -> Vector3 {
-    Vector3::new(object.length_m, object.width_m, height_m)
-}
-
 /// Returns the covariance of the centre, turned by the mounting.
-fn covariance(mounting: &Mounting, object: &ListedObject) -> Covariance {
+fn covariance(mounting: &Mounting, object: &Object) -> Covariance {
     let [xx, xy, yy] = object.position_covariance;
     let turn = mounting.radar().rotation.to_rotation_matrix();
     let turned = turn * Matrix2::new(xx, xy, xy, yy) * turn.transpose();

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
-use gyre_contract::{ListedObject, ObjectsHeader};
+use gyre_contract::Object;
 use gyre_ros2_messages::{
     Vehicle,
     frames::UNKNOWN,
@@ -15,35 +15,26 @@ use gyre_ros2_messages::{
 const STAMP_NS: i64 = 1_549_986_608_000_000_007;
 
 /// A car that drives to the right, 20 m ahead and 3 m to the left, and one that stands.
-fn header() -> ObjectsHeader {
-    let car = ListedObject {
+fn objects() -> [Object; 2] {
+    let car = Object {
         id: 17,
         x_m: 20.0,
         y_m: 3.0,
         yaw_rad: -FRAC_PI_2,
-        vx_mps: 0.0,
         vy_mps: -9.0,
         length_m: 4.5,
         width_m: 1.75,
         position_covariance: [0.25, 0.125, 0.75],
         moving: 1,
-        age: 5,
-        ..ListedObject::default()
+        ..Object::default()
     };
-    let standing = ListedObject {
+    let standing = Object {
         id: 4,
         vy_mps: 0.1,
         moving: 0,
         ..car
     };
-    let mut header = ObjectsHeader {
-        objects: 2,
-        moving: 1,
-        listed: 2,
-        ..ObjectsHeader::default()
-    };
-    header.list[..2].copy_from_slice(&[car, standing]);
-    header
+    [car, standing]
 }
 
 fn vehicle() -> Vehicle {
@@ -68,8 +59,7 @@ fn place(pose: &Pose) -> [f64; 3] {
 
 #[test]
 fn objects_are_detections_with_identity_class_box_and_covariance() {
-    let header = header();
-    let array = detections(STAMP_NS, &vehicle(), header.list());
+    let array = detections(STAMP_NS, &vehicle(), &objects());
     assert_eq!(array.header.stamp.ns(), STAMP_NS);
     assert_eq!(array.header.frame_id, "odom");
     let [car, standing] = &array.detections[..] else {
@@ -105,24 +95,23 @@ fn objects_are_where_they_are_from_the_vehicle_whose_radar_looks_elsewhere() {
         frames: "map,odo,car,top".parse().unwrap(),
         mounting: "1,0,90".parse().unwrap(),
     };
-    let header = header();
-    let array = detections(STAMP_NS, &vehicle, header.list());
+    let array = detections(STAMP_NS, &vehicle, &objects());
     assert_eq!(array.header.frame_id, "odo");
     let car = &array.detections[0];
     close(&place(&car.bbox.center), &[-2.0, 20.0, 0.0]);
     let covariance = car.results[0].pose.covariance.elements();
     let found = [0, 1, 6, 7].map(|element| covariance[element]);
     close(&found, &[0.75, -0.125, -0.125, 0.25]);
-    let shapes = markers(STAMP_NS, &vehicle, header.list()).markers;
+    let shapes = markers(STAMP_NS, &vehicle, &objects()).markers;
     let arrow = shapes.iter().find(|it| it.ns == "velocities").unwrap();
     close(&place(&arrow.pose), &[-2.0, 20.0, 0.0]);
 }
 
 #[test]
 fn markers_are_boxes_with_identities_and_arrows_of_what_moves() {
-    let mut header = header();
-    header.list[0].vx_mps = -9.0;
-    let shapes = markers(STAMP_NS, &vehicle(), header.list()).markers;
+    let mut objects = objects();
+    objects[0].vx_mps = -9.0;
+    let shapes = markers(STAMP_NS, &vehicle(), &objects).markers;
     let kinds: Vec<(i32, i32)> = shapes.iter().map(|it| (it.r#type, it.id)).collect();
     let expected = [
         (CUBE, 0),

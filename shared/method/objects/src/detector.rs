@@ -129,6 +129,11 @@ impl Output {
 }
 
 impl Detection {
+    /// Returns the covariance of `at`, m².
+    pub fn noise(&self) -> Matrix2<f64> {
+        Matrix2::identity() * self.sigma_m.powi(2)
+    }
+
     /// Transforms it from the frame of the sensor to the odometry frame, at the time of the azimuth
     /// that shows it.
     fn place(&mut self, pose: &Pose, points: &[SparsePoint], deskewed: &[Point2<f64>]) {

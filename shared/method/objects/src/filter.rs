@@ -6,6 +6,8 @@
 
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, SMatrix, SVector, Vector2, Vector4};
 
+use crate::detector::Detection;
+
 /// Turn rates of the models over the largest one.
 const TURNS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Their shares of the time: vehicles drive straight for most of it.
@@ -46,16 +48,6 @@ struct Estimate {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sighting {
-    /// The position, m, as if the object stood.
-    pub at: Point2<f64>,
-    pub noise: Matrix2<f64>,
-    /// The change of `at` by the velocity, s: it is seen at its own time, and lengthened or
-    /// shortened by the Doppler shift.
-    pub by_velocity: Matrix2<f64>,
-}
-
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Innovation {
     /// Measured less predicted, m.
     difference: Vector2<f64>,
@@ -79,15 +71,11 @@ impl Innovation {
 impl Filter {
     /// Starts at a measurement, with a velocity of zero that is as good as unknown: where it was at
     /// the scan's time depends on it.
-    pub fn new(sighting: &Sighting, speed_sigma_mps: f64) -> Self {
-        let Sighting {
-            at,
-            noise,
-            by_velocity,
-        } = sighting;
+    pub fn new(detection: &Detection, speed_sigma_mps: f64) -> Self {
+        let (at, by_velocity) = (detection.at, &detection.by_velocity);
         let variance = speed_sigma_mps.powi(2);
         let mut covariance = Matrix4::from_diagonal_element(variance);
-        let position = noise + by_velocity * by_velocity.transpose() * variance;
+        let position = detection.noise() + by_velocity * by_velocity.transpose() * variance;
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&position);
         let both = -by_velocity * variance;
         covariance.fixed_view_mut::<2, 2>(0, 2).copy_from(&both);
@@ -151,12 +139,14 @@ impl Filter {
         self.combine();
     }
 
-    pub fn innovation(&self, sighting: &Sighting) -> Innovation {
-        self.mean.innovation(sighting)
+    pub fn innovation(&self, detection: &Detection) -> Innovation {
+        self.mean.innovation(detection)
     }
 
-    pub fn update(&mut self, sighting: &Sighting) {
-        let innovations = self.models.map(|model| model.estimate.innovation(sighting));
+    pub fn update(&mut self, detection: &Detection) {
+        let innovations = self
+            .models
+            .map(|model| model.estimate.innovation(detection));
         for (model, innovation) in self.models.iter_mut().zip(&innovations) {
             model.estimate.update(innovation);
         }
@@ -257,19 +247,20 @@ impl Estimate {
         self.covariance = step * self.covariance * step.transpose() + noise;
     }
 
-    fn innovation(&self, sighting: &Sighting) -> Innovation {
+    fn innovation(&self, detection: &Detection) -> Innovation {
         let mut jacobian = Matrix2x4::zeros();
         jacobian
             .fixed_view_mut::<2, 2>(0, 0)
             .copy_from(&Matrix2::identity());
         jacobian
             .fixed_view_mut::<2, 2>(0, 2)
-            .copy_from(&sighting.by_velocity);
+            .copy_from(&detection.by_velocity);
+        let noise = detection.noise();
         Innovation {
-            difference: sighting.at.coords - jacobian * self.state,
-            covariance: jacobian * self.covariance * jacobian.transpose() + sighting.noise,
+            difference: detection.at.coords - jacobian * self.state,
+            covariance: jacobian * self.covariance * jacobian.transpose() + noise,
             jacobian,
-            noise: sighting.noise,
+            noise,
         }
     }
 

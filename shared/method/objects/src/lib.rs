@@ -13,5 +13,5 @@ mod tracker;
 
 pub use assignment::assign;
 pub use config::{ObjectsConfig, ObjectsKind};
-pub use object::{Object, PlacedScan};
+pub use object::PlacedScan;
 pub use tracker::ObjectTracker;

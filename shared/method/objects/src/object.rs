@@ -1,5 +1,5 @@
 use gyre_geometry::{Pose, Twist};
-use nalgebra::{Matrix2, Point2, Vector2};
+use nalgebra::{Point2, Vector2};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedScan {
@@ -10,25 +10,6 @@ pub struct PlacedScan {
     /// The velocity of the sensor during the sweep, for deskewing the points: from the motion since
     /// the scan before, by [`Twist::from_chord`].
     pub twist: Twist,
-}
-
-/// A moving object at the time of a scan, in the frame of the odometry.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Object {
-    /// The identity: counted from 1, and given to no other object of the run.
-    pub id: u64,
-    pub position: Point2<f64>,
-    pub velocity: Vector2<f64>,
-    /// The heading, rad: the direction of the velocity, or the network's heading for a slow object.
-    pub yaw_rad: f64,
-    pub length_m: f64,
-    pub width_m: f64,
-    /// False if its speed is not significantly above a standing object's.
-    pub moving: bool,
-    /// Scans since it was first seen, that one included.
-    pub age: u32,
-    pub position_covariance: Matrix2<f64>,
-    pub velocity_covariance: Matrix2<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,9 @@
+use gyre_contract::Object;
+use gyre_geometry::wrap_angle;
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use crate::Object;
 use crate::detector::Detection;
-use crate::filter::{Filter, Sighting, mahalanobis};
+use crate::filter::{Filter, mahalanobis};
 use crate::object::Outline;
 
 /// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
@@ -75,7 +76,7 @@ pub(crate) struct Track {
 
 impl Track {
     pub fn new(detection: &Detection) -> Self {
-        let mut filter = Filter::new(&sighting(detection), UNKNOWN_MPS);
+        let mut filter = Filter::new(detection, UNKNOWN_MPS);
         measure_velocity(&mut filter, detection);
         Self {
             filter,
@@ -107,7 +108,7 @@ impl Track {
 
     /// Returns the cost of assigning a detection to the track; `None` outside of its gate.
     pub fn cost(&self, detection: &Detection) -> Option<f64> {
-        let place = self.filter.innovation(&sighting(detection));
+        let place = self.filter.innovation(detection);
         let variance = (detection.sigma_mps * VELOCITY_SIGMAS).powi(2);
         let covariance = self.filter.velocity_covariance() + Matrix2::identity() * variance;
         let faster = detection.velocity - self.filter.velocity();
@@ -118,7 +119,7 @@ impl Track {
     }
 
     pub fn update(&mut self, detection: &Detection) {
-        self.filter.update(&sighting(detection));
+        self.filter.update(detection);
         measure_velocity(&mut self.filter, detection);
         let speed_mps = self.filter.velocity().norm();
         let sigma_mps = SLIP_MPS + HEADING_SIGMA_RAD * speed_mps;
@@ -237,28 +238,28 @@ impl Track {
         let is_seen = self.unseen_s == 0.0 && self.score >= KEEP_SCORE;
         let is_there = is_seen || self.score >= CONFIRM_SCORE;
         let id = self.id.filter(|_| is_there && !self.lost)?;
+        let (at, velocity) = (self.position(), self.filter.velocity());
         let [length_m, width_m] = self.size_m;
         Some(Object {
             id,
-            position: self.position(),
-            velocity: self.filter.velocity(),
-            yaw_rad: self.heading.y.atan2(self.heading.x),
+            x_m: at.x,
+            y_m: at.y,
+            yaw_rad: wrap_angle(self.heading.y.atan2(self.heading.x)),
+            vx_mps: velocity.x,
+            vy_mps: velocity.y,
             length_m,
             width_m,
-            moving: self.moving,
+            position_covariance: packed(&self.filter.position_covariance()),
+            velocity_covariance: packed(&self.filter.velocity_covariance()),
+            moving: self.moving.into(),
             age: self.age,
-            position_covariance: self.filter.position_covariance(),
-            velocity_covariance: self.filter.velocity_covariance(),
         })
     }
 }
 
-fn sighting(detection: &Detection) -> Sighting {
-    Sighting {
-        at: detection.at,
-        noise: Matrix2::identity() * detection.sigma_m.powi(2),
-        by_velocity: detection.by_velocity,
-    }
+/// Returns xx, xy and yy.
+fn packed(matrix: &Matrix2<f64>) -> [f64; 3] {
+    [matrix.m11, matrix.m12, matrix.m22]
 }
 
 fn measure_velocity(filter: &mut Filter, detection: &Detection) {
@@ -315,7 +316,7 @@ mod tests {
         assert!(track.judge());
         track.id = Some(7);
         let object = track.object().expect("it is one");
-        assert!(object.id == 7 && object.moving && object.age == 3);
+        assert!(object.id == 7 && object.is_moving() && object.age == 3);
     }
 
     #[test]

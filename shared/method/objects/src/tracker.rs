@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use gyre_contract::Object;
 use gyre_geometry::SparsePoint;
 use gyre_masking::networks::PlanesError;
 
+use crate::PlacedScan;
 use crate::assignment::assign;
 use crate::detector::{Detection, Detector};
 use crate::track::Track;
-use crate::{Object, PlacedScan};
 
 /// A place counts as part of a moving vehicle from this likelihood of the network on: a less likely
 /// place keeps no track alive.

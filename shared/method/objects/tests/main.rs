@@ -5,8 +5,9 @@
 
 use std::f64::consts::{PI, TAU};
 
+use gyre_contract::Object;
 use gyre_geometry::{Pose, SparsePoint, Twist, pose};
-use gyre_objects::{Object, ObjectTracker, PlacedScan};
+use gyre_objects::{ObjectTracker, PlacedScan};
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,15 +26,6 @@ struct Car {
 }
 
 impl Car {
-    fn new(at: [f64; 2], velocity: [f64; 2]) -> Self {
-        Self {
-            at: at.into(),
-            velocity: velocity.into(),
-            from_s: 0.0,
-            turn_radps: 0.0,
-        }
-    }
-
     fn at(&self, time_s: f64) -> (Point2<f64>, Vector2<f64>) {
         let time_s = time_s - self.from_s;
         let turned = self.turn_radps * time_s;
@@ -75,9 +67,14 @@ impl Scene {
         f64::from(self.scan) * PERIOD_S
     }
 
-    /// Returns the place that is so far from the sensor now.
-    fn ahead(&self, x_m: f64, y_m: f64) -> [f64; 2] {
-        [self.sensor_mps * self.time_s() + x_m, y_m]
+    /// Returns a car that is so far from the sensor now, and drives straight.
+    fn car(&self, x_m: f64, y_m: f64, velocity: [f64; 2]) -> Car {
+        Car {
+            at: self.sensor(0.0) * Point2::new(x_m, y_m),
+            velocity: velocity.into(),
+            from_s: self.time_s(),
+            turn_radps: 0.0,
+        }
     }
 
     /// Steps so many times with these cars, and returns the last objects.
@@ -151,10 +148,18 @@ impl Scene {
     }
 }
 
+fn place_of(object: &Object) -> Point2<f64> {
+    Point2::new(object.x_m, object.y_m)
+}
+
+fn velocity_of(object: &Object) -> Vector2<f64> {
+    Vector2::new(object.vx_mps, object.vy_mps)
+}
+
 #[test]
 fn what_stands_is_no_object_from_a_vehicle_that_moves() {
     let mut scene = Scene::settled();
-    let parked = Car::new(scene.ahead(60.0, 5.0), [0.0, 0.0]);
+    let parked = scene.car(60.0, 5.0, [0.0, 0.0]);
     for _ in 0..40 {
         assert_eq!(scene.step(&[parked]), []);
     }
@@ -163,10 +168,7 @@ fn what_stands_is_no_object_from_a_vehicle_that_moves() {
 #[test]
 fn an_oncoming_car_is_tracked_from_its_fourth_scan_without_bias_of_time_and_doppler() {
     let mut scene = Scene::settled();
-    let car = Car {
-        from_s: scene.time_s(),
-        ..Car::new(scene.ahead(75.0, 3.5), [-7.0, 0.0])
-    };
+    let car = scene.car(75.0, 3.5, [-7.0, 0.0]);
     let mut seen = 0;
     let mut last = None;
     for _ in 0..16 {
@@ -177,10 +179,10 @@ fn an_oncoming_car_is_tracked_from_its_fourth_scan_without_bias_of_time_and_dopp
         if seen > 3 {
             assert_eq!(objects.len(), 1, "{ahead_m} m");
             let object = objects[0];
-            assert!(object.moving && last.is_none_or(|id| id == object.id));
+            assert!(object.is_moving() && last.is_none_or(|id| id == object.id));
             last = Some(object.id);
-            assert!((object.velocity - velocity).norm() < 1.5, "{object:?}");
-            let off_m = (object.position - centre).norm();
+            assert!((velocity_of(&object) - velocity).norm() < 1.5, "{object:?}");
+            let off_m = (place_of(&object) - centre).norm();
             assert!(off_m < 1.0, "{object:?} at {centre}");
             assert!((object.yaw_rad.abs() - PI).abs() < 0.2, "{object:?}");
         }
@@ -191,10 +193,7 @@ fn an_oncoming_car_is_tracked_from_its_fourth_scan_without_bias_of_time_and_dopp
 #[test]
 fn a_car_that_turns_off_keeps_its_identity_and_its_velocity_follows() {
     let mut scene = Scene::settled();
-    let car = Car {
-        from_s: scene.time_s(),
-        ..Car::new(scene.ahead(20.0, -4.0), [7.0, 0.0])
-    };
+    let car = scene.car(20.0, -4.0, [7.0, 0.0]);
     let first = scene.steps(8, &[car]);
     assert_eq!(first.len(), 1, "{first:?}");
     let (at, velocity) = car.at(scene.time_s());
@@ -210,9 +209,9 @@ fn a_car_that_turns_off_keeps_its_identity_and_its_velocity_follows() {
         assert_eq!(objects.len(), 1, "{objects:?}");
         let object = objects[0];
         assert_eq!(object.id, first[0].id);
-        let off_mps = (object.velocity - velocity).norm();
+        let off_mps = (velocity_of(&object) - velocity).norm();
         assert!(off_mps < 3.0, "{object:?}, {velocity}");
-        let off_m = (object.position - centre).norm();
+        let off_m = (place_of(&object) - centre).norm();
         assert!(off_m < 1.2, "{object:?} at {centre}");
     }
 }
@@ -220,24 +219,18 @@ fn a_car_that_turns_off_keeps_its_identity_and_its_velocity_follows() {
 #[test]
 fn two_cars_in_a_queue_stay_two() {
     let mut scene = Scene::settled();
-    let behind = |gap_m: f64| Car {
-        from_s: scene.time_s(),
-        ..Car::new(scene.ahead(50.0 + gap_m, 4.0), [-7.0, 0.0])
-    };
+    let behind = |gap_m: f64| scene.car(50.0 + gap_m, 4.0, [-7.0, 0.0]);
     let cars = [behind(0.0), behind(16.0)];
     let objects = scene.steps(10, &cars);
     assert_eq!(objects.len(), 2, "{objects:?}");
-    let apart = objects[0].position - objects[1].position;
+    let apart = place_of(&objects[0]) - place_of(&objects[1]);
     assert!((apart.norm() - 16.0).abs() < 1.0, "{objects:?}");
 }
 
 #[test]
 fn a_hidden_car_keeps_its_identity_and_ends_when_it_stays_hidden() {
     let mut scene = Scene::settled();
-    let car = Car {
-        from_s: scene.time_s(),
-        ..Car::new(scene.ahead(15.0, 4.0), [9.0, 0.0])
-    };
+    let car = scene.car(15.0, 4.0, [9.0, 0.0]);
     let before = scene.steps(8, &[car]);
     assert_eq!(before.len(), 1);
     scene.steps(2, &[]);
@@ -252,10 +245,7 @@ fn a_hidden_car_keeps_its_identity_and_ends_when_it_stays_hidden() {
 #[test]
 fn a_gap_in_time_ends_all_tracks_and_identities_are_not_given_again() {
     let mut scene = Scene::settled();
-    let car = |scene: &Scene| Car {
-        from_s: scene.time_s(),
-        ..Car::new(scene.ahead(15.0, 4.0), [9.0, 0.0])
-    };
+    let car = |scene: &Scene| scene.car(15.0, 4.0, [9.0, 0.0]);
     let first = car(&scene);
     let first = scene.steps(8, &[first])[0].id;
     scene.scan += 40;

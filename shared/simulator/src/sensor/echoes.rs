@@ -165,7 +165,7 @@ impl BeamIndex {
     }
 }
 
-/// Scintillation: real objects are some wavelengths large and have lobes, so their echoes fluctuate
+/// Scintillation: real targets are some wavelengths large and have lobes, so their echoes fluctuate
 /// with the direction. Returns the factor on the cross-section of a scatterer at `place`, seen from
 /// `direction` (a unit vector): exponentially distributed over directions with a mean near 1
 /// (Swerling case 1), and smooth.

@@ -9,7 +9,7 @@ use crate::occlusion::crossing;
 
 /// Rays for each azimuth of 0.9 degrees.
 const RAYS: usize = 4;
-/// Minimum distance of a wall from the objects behind it that it hides, metres: objects lean
+/// Minimum distance of a wall from the targets behind it that it hides, metres: targets lean
 /// against walls.
 const CLEARANCE_M: f32 = 0.1;
 

@@ -8,11 +8,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{AnyMessage, Received, Run, clock};
+use gyre_client::{Received, Run, clock};
 use gyre_contract::{Masked, MaskedHeader, Message, Pose, Topic};
 use gyre_recording::{
     LogTail,
-    view::{LOG, POINTS, TRAJECTORY, View, views},
+    view::{LOG, POINTS, TRAJECTORY, View, image_channel, views},
 };
 
 use super::{
@@ -37,13 +37,16 @@ pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHan
         let thread = thread::Builder::new().name("foxglove".to_owned());
         thread.spawn(move || report(&followed, &hub))?
     };
-    let has_channel = |topic: &&Topic| hub.channels.iter().any(|it| it.topic == Some(topic.name));
-    let topics = gyre_contract::all().filter(has_channel);
+    let is_shown = |topic: &&Topic| {
+        let mut channels = hub.channels.iter();
+        channels.any(|it| it.topic == Some(topic.name))
+    };
+    let topics = gyre_contract::all().filter(is_shown);
     let threads = topics.map(|topic| follow(followed, hub, topic));
     iter::once(Ok(report)).chain(threads).collect()
 }
 
-/// Follows a topic, and draws the views that take long at most once in an interval.
+/// Follows a topic. The views that take long are published at most once in an interval.
 fn follow(
     followed: &Arc<Followed>,
     hub: &Arc<Hub>,
@@ -81,24 +84,24 @@ fn follow(
     })
 }
 
-/// Publishes the views of a message that take long: its image, its points, or the trajectory.
-fn draw(hub: &Hub, run: &RunView, topic: &str, message: &Received<AnyMessage>) {
+/// Publishes the views that take long. A message that is too short for its header has no image.
+fn draw<M>(hub: &Hub, run: &RunView, topic: &str, message: &Received<M>) {
     let (header, stamp_ns) = (message.header_bytes(), message.item().stamp_ns);
-    let mut views = Vec::new();
-    // A message that is too short for its header has no image.
-    if hub.is_wanted(&format!("/{topic}")) {
-        views.extend(View::image_of(topic, header, message.values(), stamp_ns));
+    if let Some(channel) = image_channel(topic)
+        && hub.is_wanted(channel)
+        && let Some(view) = View::image_of(topic, header, message.values(), stamp_ns)
+    {
+        hub.publish(channel, stamp_ns, view.data);
     }
     if topic == Masked::TOPIC && hub.is_wanted(POINTS) {
         let header: &MaskedHeader = bytemuck::from_bytes(header);
-        let points = header.points(message.values());
-        views.extend(points.map(|points| View::points(points, header)));
+        if let Some(points) = header.points(message.values()) {
+            hub.publish(POINTS, stamp_ns, View::points(points, header).data);
+        }
     }
     if topic == Pose::TOPIC && hub.is_wanted(TRAJECTORY) {
-        views.push(View::trajectory(run.trajectory().into_iter(), stamp_ns));
-    }
-    for view in views {
-        hub.publish(view.channel, stamp_ns, view.data);
+        let view = View::trajectory(run.trajectory().into_iter(), stamp_ns);
+        hub.publish(TRAJECTORY, stamp_ns, view.data);
     }
 }
 

@@ -8,10 +8,15 @@ const DT_S: f64 = 0.25;
 const SIGMA_M: f64 = 0.4;
 const SPEED_SIGMA_MPS: f64 = 8.0;
 
-fn sighting(at: Vector2<f64>) -> Sighting {
-    Sighting {
+fn seen(at: Vector2<f64>) -> Detection {
+    Detection {
         at: at.into(),
-        noise: Matrix2::identity() * SIGMA_M.powi(2),
+        velocity: Vector2::zeros(),
+        heading: Vector2::x(),
+        size_m: [4.5, 1.9],
+        likely: 0.9,
+        sigma_m: SIGMA_M,
+        sigma_mps: 1.0,
         by_velocity: Matrix2::zeros(),
     }
 }
@@ -29,6 +34,14 @@ struct Vehicle {
 }
 
 impl Vehicle {
+    fn new(velocity: Vector2<f64>) -> Self {
+        Self {
+            position: Vector2::new(20.0, -7.0),
+            velocity,
+            model: 2,
+        }
+    }
+
     fn step(&mut self, rng: &mut ChaCha8Rng) {
         if rng.random::<f64>() > (-DT_S / TURN_LASTS_S).exp() {
             let mut left = rng.random::<f64>();
@@ -68,9 +81,8 @@ fn tracked(
     rng: &mut ChaCha8Rng,
     mut step: impl FnMut(&mut Vehicle, &mut ChaCha8Rng),
 ) -> Filter {
-    let measured = |vehicle: &Vehicle, rng: &mut ChaCha8Rng| {
-        sighting(vehicle.position + normal(rng) * SIGMA_M)
-    };
+    let measured =
+        |vehicle: &Vehicle, rng: &mut ChaCha8Rng| seen(vehicle.position + normal(rng) * SIGMA_M);
     let mut filter = Filter::new(&measured(vehicle, rng), SPEED_SIGMA_MPS);
     for _ in 1..scans {
         step(vehicle, rng);
@@ -88,11 +100,7 @@ fn the_covariance_is_that_of_the_errors_over_vehicles_that_drive_as_the_models()
     let (mut nees, mut squares_m2, runs) = (0.0, 0.0, 600);
     for _ in 0..runs {
         let velocity = normal(&mut rng) * SPEED_SIGMA_MPS;
-        let mut vehicle = Vehicle {
-            position: Vector2::new(20.0, -7.0),
-            velocity,
-            model: 2,
-        };
+        let mut vehicle = Vehicle::new(velocity);
         let filter = tracked(&mut vehicle, 16, &mut rng, |vehicle, rng| {
             vehicle.step(rng);
         });
@@ -114,11 +122,7 @@ fn a_vehicle_that_goes_on_turning_is_found_to_turn_and_a_straight_one_is_not() {
     for wanted_radps in [-0.6, -0.35, 0.0, 0.35, 0.6] {
         let (mut found_radps, mut error_mps, runs) = (0.0, 0.0, 40);
         for _ in 0..runs {
-            let mut vehicle = Vehicle {
-                position: Vector2::new(20.0, -7.0),
-                velocity: Vector2::new(-6.0, 5.0),
-                model: 2,
-            };
+            let mut vehicle = Vehicle::new(Vector2::new(-6.0, 5.0));
             let filter = tracked(&mut vehicle, 14, &mut rng, |vehicle, _| {
                 vehicle.turn(wanted_radps);
             });
@@ -140,11 +144,7 @@ fn a_vehicle_that_goes_on_turning_is_found_to_turn_and_a_straight_one_is_not() {
 #[test]
 fn a_heading_turns_the_velocity_towards_it_and_makes_it_certain_across_it_alone() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
-    let mut vehicle = Vehicle {
-        position: Vector2::new(20.0, -7.0),
-        velocity: Vector2::new(6.0, 0.0),
-        model: 2,
-    };
+    let mut vehicle = Vehicle::new(Vector2::new(6.0, 0.0));
     let mut filter = tracked(&mut vehicle, 6, &mut rng, |vehicle, _| {
         vehicle.turn(0.0);
     });
@@ -167,7 +167,7 @@ fn a_heading_turns_the_velocity_towards_it_and_makes_it_certain_across_it_alone(
 
 #[test]
 fn a_measured_velocity_is_taken_in_its_direction_and_states_are_apart_by_it() {
-    let place = sighting(Vector2::new(20.0, -7.0));
+    let place = seen(Vector2::new(20.0, -7.0));
     let still = Filter::new(&place, SPEED_SIGMA_MPS);
     let mut moving = still;
     moving.measure(&Vector2::x(), 6.0, 0.1);
@@ -182,11 +182,7 @@ fn a_measured_velocity_is_taken_in_its_direction_and_states_are_apart_by_it() {
 #[test]
 fn a_standing_vehicle_has_no_speed() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut vehicle = Vehicle {
-        position: Vector2::new(20.0, -7.0),
-        velocity: Vector2::zeros(),
-        model: 2,
-    };
+    let mut vehicle = Vehicle::new(Vector2::zeros());
     let filter = tracked(&mut vehicle, 20, &mut rng, |_, _| {});
     let (speed_mps, sigma_mps) = filter.speed();
     assert!(
