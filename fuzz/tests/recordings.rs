@@ -39,14 +39,11 @@ impl Recording {
     /// A valid recording of three scans.
     fn of(format: Format) -> Self {
         let (middle, last) = (AZIMUTHS / 2 - 1, AZIMUTHS - 1);
-        let (folder, named_row, unit) = match format {
-            Format::Oxford => ("radar", 0, 1),
-            Format::Oord => ("Navtech_CTS350-X_Radar", 0, 1),
-            Format::Boreas | Format::BoreasRt => ("radar", middle, 1),
-            Format::Mulran => ("sensor_data/radar/polar", last, 1000),
-            Format::MulranOxfordForm => ("polar_oxford_form", last, 1000),
-            Format::Radiate => ("Navtech_Polar", 0, 1),
-            _ => ("navtech", 0, 1),
+        let folder = format.folders()[0];
+        let (named_row, unit) = match format {
+            Format::Boreas | Format::BoreasRt => (middle, 1),
+            Format::Mulran | Format::MulranOxfordForm => (last, 1000),
+            _ => (0, 1),
         };
         let transposed = matches!(format, Format::Mulran | Format::Radiate);
         let image = |k: i64| {

@@ -14,6 +14,7 @@ use gyre_radar::lost::stale_rows;
 use super::{folder, opened, options};
 use crate::common::{
     PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_png, write_radiate,
+    write_sweeps,
 };
 
 fn assert_powers(scan: &OwnedScan) {
@@ -202,14 +203,9 @@ fn images_of_other_content_are_refused_in_plain_words() {
 #[test]
 fn the_first_images_count_once_among_the_sizes() {
     let root = folder();
-    for k in 0..20 {
-        let start = START_US + k * PERIOD_US;
-        let sweep = Sweep {
-            bins: if k < 8 { 30 } else { 60 },
-            ..Sweep::at(start)
-        };
-        sweep.write(&root.path().join(format!("navtech/{start}.png")));
-    }
+    write_sweeps(&root.path().join("navtech"), 20, |k, sweep| {
+        sweep.bins = if k < 8 { 30 } else { 60 };
+    });
     assert_eq!(opened(root.path()).image_size().width, 71);
 }
 

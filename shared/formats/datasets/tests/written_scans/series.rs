@@ -8,7 +8,7 @@ use gyre_datasets::{Dataset, DatasetOptions, Format, inspect, open, reopen};
 
 use super::{assert_rejected, folder, opened, options};
 use crate::common::{
-    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_radiate,
+    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_radiate, write_sweeps,
 };
 
 /// Writes a scan of the turn `k`.
@@ -145,14 +145,9 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
         ("navtech", Format::Fomo),
     ] {
         let root = folder();
-        for k in 0..6 {
-            let start = START_US + k * PERIOD_US;
-            let sweep = Sweep {
-                rows: rows_of(k),
-                ..Sweep::at(start)
-            };
-            sweep.write(&root.path().join(name).join(format!("{start}.png")));
-        }
+        write_sweeps(&root.path().join(name), 6, |k, sweep| {
+            sweep.rows = rows_of(k);
+        });
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), format);
         assert_eq!(dataset.image_size().height, 40);
@@ -180,15 +175,10 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
 #[test]
 fn an_image_without_encoder_and_with_half_a_turn_is_refused() {
     let root = folder();
-    for k in 0..4 {
-        let start = START_US + k * PERIOD_US;
-        let sweep = Sweep {
-            rows: if k == 0 { 20 } else { 40 },
-            ..Sweep::at(start)
-        };
-        let name = format!("Navtech_CTS350-X_Radar/{start}.png");
-        sweep.write(&root.path().join(name));
-    }
+    let images = root.path().join("Navtech_CTS350-X_Radar");
+    write_sweeps(&images, 4, |k, sweep| {
+        sweep.rows = if k == 0 { 20 } else { 40 };
+    });
     let mut dataset = opened(root.path());
     let expected = "most images of the dataset are 71 columns x 40 rows";
     assert_refused(read(dataset.as_mut(), 0), expected);
