@@ -7,7 +7,6 @@
 //! A failure prints the edits, shrunk, and the seed that repeats it.
 
 pub mod edit;
-pub mod recording;
 
 use std::{
     error::Error,

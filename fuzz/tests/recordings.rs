@@ -7,9 +7,104 @@ use gyre_datasets::{DatasetOptions, Format, inspect, open};
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, TextEdit, edit_bytes, edit_text},
-    recording::{Image, Recording, write},
 };
 use gyre_geometry::OwnedScan;
+use tempfile::TempDir;
+
+use self::common::{PERIOD_US, START_US, Sweep, write_png, written};
+
+#[path = "../../shared/formats/datasets/tests/common/mod.rs"]
+mod common;
+
+const AZIMUTHS: i64 = 16;
+const BINS: usize = 40;
+
+struct Image {
+    /// The name of the file, relative to the recording.
+    name: String,
+    /// Pixels a row.
+    width: usize,
+    pixels: Vec<u8>,
+}
+
+/// A small recording.
+struct Recording {
+    format: Format,
+    images: Vec<Image>,
+    /// Texts beside them: names and contents.
+    texts: Vec<(String, String)>,
+}
+
+impl Recording {
+    /// A valid recording of three scans.
+    fn of(format: Format) -> Self {
+        let (middle, last) = (AZIMUTHS / 2 - 1, AZIMUTHS - 1);
+        let folder = format.folders()[0];
+        let (named_row, unit) = match format {
+            Format::Boreas | Format::BoreasRt => (middle, 1),
+            Format::Mulran | Format::MulranOxfordForm => (last, 1000),
+            _ => (0, 1),
+        };
+        let transposed = matches!(format, Format::Mulran | Format::Radiate);
+        let image = |k: i64| {
+            let sweep = Sweep {
+                rows: AZIMUTHS as usize,
+                bins: BINS,
+                step: 5600 / AZIMUTHS as u16,
+                row_interval: PERIOD_US / AZIMUTHS * unit,
+                ..Sweep::at((START_US + k * PERIOD_US) * unit)
+            };
+            let number = match format {
+                Format::Radiate => format!("{:06}", k + 7),
+                _ => (sweep.start + named_row * sweep.row_interval).to_string(),
+            };
+            let plain = || (0..AZIMUTHS as usize * BINS).map(|pixel| (pixel * 7) as u8);
+            let (width, pixels) = match transposed {
+                true => (sweep.rows, plain().collect()),
+                false => (sweep.width(), sweep.pixels()),
+            };
+            Image {
+                name: format!("{folder}/{number}.png"),
+                width,
+                pixels,
+            }
+        };
+        let options = format!(
+            "format = \"{format}\"\nrange_resolution_m = 0.5\nrange_offset_m = -0.25\ndoppler_s = 0.04\n"
+        );
+        let mut texts = vec![("dataset.toml".to_owned(), options)];
+        let mut list = |name: &str, line: &dyn Fn(i64) -> String| {
+            texts.push((name.to_owned(), (0..3).map(line).collect()));
+        };
+        match format {
+            Format::Oxford => list("radar.timestamps", &|k| {
+                format!("{} 1\n", START_US + k * PERIOD_US)
+            }),
+            Format::Radiate => list("Navtech_Polar.txt", &|k| {
+                let (frame, ns) = (k + 7, 250_000_000 * k + 3_000_000);
+                format!("Frame: {frame:06} Time: 1549986607.{ns}\n")
+            }),
+            _ => {}
+        }
+        Self {
+            format,
+            images: (0..3).map(image).collect(),
+            texts,
+        }
+    }
+
+    /// Writes it into an empty folder.
+    fn write(&self, folder: &TempDir) {
+        for image in &self.images {
+            let height = image.pixels.len() / image.width;
+            let path = folder.path().join(&image.name);
+            write_png(&path, image.width, height, &image.pixels);
+        }
+        for (name, text) in &self.texts {
+            written(folder, name, text);
+        }
+    }
+}
 
 /// An edit of a row's metadata, or of its pixels.
 #[derive(Clone, Debug, TypeGenerator)]
@@ -114,7 +209,7 @@ fn pixels() {
             let count = recording.images.len();
             let image = &mut recording.images[usize::from(*image) % count];
             edit_rows(&mut image.pixels, image.width, edits);
-            recording.write(folder.path()).unwrap();
+            recording.write(&folder);
             target.run(|| use_recording(folder.path(), &chosen.options()));
         });
 }
@@ -171,11 +266,12 @@ fn image_files() {
         .with_type::<(Chosen, bool, Vec<FileEdit>)>()
         .for_each(|(chosen, all, edits)| {
             let (folder, recording) = (folder(), chosen.recording());
-            recording.write(folder.path()).unwrap();
+            recording.write(&folder);
             for image in recording.images.iter().take(if *all { 3 } else { 1 }) {
-                let mut file = image.png();
+                let path = folder.path().join(&image.name);
+                let mut file = fs::read(&path).unwrap();
                 edits.iter().for_each(|edit| edit_file(&mut file, edit));
-                write(folder.path(), &image.name, &file).unwrap();
+                fs::write(&path, file).unwrap();
             }
             target.run(|| use_recording(folder.path(), &chosen.options()));
         });
@@ -208,7 +304,7 @@ fn lists_and_names() {
             for edit in edits {
                 edit_folder(&mut recording, edit);
             }
-            recording.write(folder.path()).unwrap();
+            recording.write(&folder);
             target.run(|| use_recording(folder.path(), &chosen.options()));
         });
 }
@@ -271,7 +367,7 @@ fn set_encoder(pixels: &mut [u8], width: usize, size: u16) {
 }
 
 /// A folder in memory, where there is one.
-pub fn folder() -> tempfile::TempDir {
+pub fn folder() -> TempDir {
     let memory = Path::new("/dev/shm");
     let parent = match memory.is_dir() {
         true => memory.to_owned(),
@@ -286,7 +382,7 @@ fn a_recording_without_edits_is_accepted_in_every_format() {
     for format in 0..Format::ALL.len() as u8 {
         for named in [true, false] {
             let (folder, chosen) = (folder(), Chosen { format, named });
-            chosen.recording().write(folder.path()).unwrap();
+            chosen.recording().write(&folder);
             use_recording(folder.path(), &chosen.options()).unwrap();
             assert!(fs::read_dir(folder.path()).unwrap().count() > 0);
         }

@@ -31,6 +31,7 @@ use gyre_geometry::{
 use gyre_radar::{NoDoppler, check_chirps};
 
 pub use detect::is_dataset;
+pub(crate) use detect::is_folder_of_images;
 pub use encoder::{EncoderTurn, FIRST_TURNS, correct_eccentricity, encoder_counts};
 pub use error::{OpenError, ReadError};
 pub use format::Format;

@@ -10,21 +10,15 @@ use std::{
 use thiserror::Error;
 
 use crate::{
-    OpenError, frame_stamps,
+    OpenError,
+    dataset::is_folder_of_images,
+    frame_stamps,
     table::{Columns, MAX_BYTES, Raw, Rows},
 };
 
 /// The largest file of `GPS_IMU_Twist`: they have about 900 bytes.
 const MAX_TWIST_BYTES: u64 = 1 << 16;
 const UNREADABLE: &str = "the file of this number is missing, or has another form";
-/// Folders of images, beside which the log lies too if one of them is given for the dataset.
-const IMAGES: [&str; 5] = [
-    "radar",
-    "Navtech_Polar",
-    "navtech",
-    "polar",
-    "polar_oxford_form",
-];
 
 /// A log that cannot be used. `of` is the section of the sensor in configurations. Each message
 /// names the fault, its place and a remedy.
@@ -103,9 +97,7 @@ pub(crate) fn find(folder: &Path, of: &'static str, places: &[&str]) -> Result<P
 /// Returns the folders that may contain the logs of a dataset: its own, and the parent of a folder
 /// of images.
 pub(crate) fn roots(folder: &Path) -> impl Iterator<Item = &Path> {
-    let name = folder.file_name().and_then(|name| name.to_str());
-    let is_of_images = name.is_some_and(|name| IMAGES.contains(&name));
-    let above = folder.parent().filter(|_| is_of_images);
+    let above = folder.parent().filter(|_| is_folder_of_images(folder));
     [Some(folder), above].into_iter().flatten()
 }
 

@@ -79,42 +79,26 @@ impl Scans {
         options: &DatasetOptions,
         recorded: &DatasetOptions,
     ) -> Result<(), OpenError> {
-        let other = |wished: Option<f32>, is: f32| {
-            let wished = wished.filter(|wished| *wished != is);
-            wished.map(|wished| wished.to_string())
-        };
         let scan = &self.first;
-        let eccentricity_rad = recorded.azimuth_eccentricity_rad.unwrap_or_default();
-        let topic = options.topic.map(|topic| topic.to_string());
-        let source = options.azimuth_source;
-        let is_other = source.is_some() && source != recorded.azimuth_source;
-        let source = is_other.then(|| format!("{source:?}").to_lowercase());
-        let counts = options.encoder_counts;
-        let counts = counts.filter(|counts| Some(*counts) != recorded.encoder_counts);
-        let refused = [
-            (
-                "range_resolution_m",
-                other(options.range_resolution_m, scan.range_resolution_m),
-            ),
-            (
-                "range_offset_m",
-                other(options.range_offset_m, scan.range_offset_m),
-            ),
-            ("doppler_s", other(options.doppler_s, scan.doppler_s)),
-            (
-                "azimuth_eccentricity_rad",
-                other(options.azimuth_eccentricity_rad, eccentricity_rad),
-            ),
-            ("topic", topic),
-            ("azimuth_source", source),
-            ("encoder_counts", counts.map(|counts| counts.to_string())),
-        ];
+        let is = DatasetOptions {
+            range_resolution_m: Some(scan.range_resolution_m),
+            range_offset_m: Some(scan.range_offset_m),
+            doppler_s: Some(scan.doppler_s),
+            azimuth_eccentricity_rad: recorded.azimuth_eccentricity_rad.or(Some(0.0)),
+            topic: None,
+            ..*recorded
+        };
         let reason = "its scans have the constants that they were recorded with; leave the key out";
-        for (key, value) in refused {
-            if let Some(value) = value {
-                return Err(OpenError::option(Some(Format::Mcap), key, value, reason));
-            }
+        macro_rules! check {
+            ($($key:ident)*) => {$(
+                if let Some(value) = options.$key.filter(|value| Some(*value) != is.$key) {
+                    let key = stringify!($key);
+                    return Err(OpenError::option(Some(Format::Mcap), key, value, reason));
+                }
+            )*};
         }
+        check!(range_resolution_m range_offset_m doppler_s azimuth_eccentricity_rad);
+        check!(topic azimuth_source encoder_counts);
         Ok(())
     }
 }

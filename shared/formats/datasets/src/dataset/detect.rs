@@ -65,6 +65,18 @@ pub fn is_dataset(root: &Path) -> bool {
     folders.any(|folder| has_png(&root.join(folder)))
 }
 
+/// Returns whether a folder has the name of a known folder of images.
+pub(crate) fn is_folder_of_images(folder: &Path) -> bool {
+    let name = folder.file_name().and_then(|name| name.to_str());
+    name.is_some_and(|name| known_by_name(name).is_some())
+}
+
+fn known_by_name(name: &str) -> Option<&'static Known> {
+    let is_of = |folder: &&str| Path::new(folder).ends_with(name);
+    let mut known = KNOWN.iter();
+    known.find(|(_, folders, _)| folders.iter().any(is_of))
+}
+
 pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenError> {
     check_folder(root)?;
     let folder = find_folder(root, forced);
@@ -193,10 +205,7 @@ fn by_layout(root: &Path, folder: &Path) -> Option<Format> {
         let mut places = folders.flat_map(|folder| files.map(|file| folder.join(file)));
         return places.any(|file| file.exists()).then_some(Format::Oxford);
     }
-    let is_of = |folder: &&str| Path::new(folder).ends_with(name);
-    let mut known = KNOWN.iter();
-    let found = known.find(|(_, folders, _)| folders.iter().any(is_of));
-    found.map(|(format, ..)| *format)
+    known_by_name(name).map(|(format, ..)| *format)
 }
 
 fn by_image(

@@ -94,7 +94,11 @@ impl FirstImage {
     }
 
     pub(crate) fn turn(&self) -> EncoderTurn {
-        let counts: Vec<u16> = self.rows.iter().map(|row| row.count).collect();
-        EncoderTurn::new(&counts, |row| self.row_ns(row))
+        turn_of(&self.rows)
     }
+}
+
+pub(crate) fn turn_of(rows: &[RowMetadata]) -> EncoderTurn {
+    let counts: Vec<u16> = rows.iter().map(|row| row.count).collect();
+    EncoderTurn::new(&counts, |row| stamp::to_ns(rows.get(row)?.stamp))
 }

@@ -13,7 +13,7 @@ use super::{
     detect::Found,
     encoder::{EncoderTurn, FIRST_TURNS, correct_eccentricity, encoder_counts},
     error::{OpenError, ReadError},
-    first_image::{FirstImage, NamedBy},
+    first_image::{FirstImage, NamedBy, turn_of},
     format::Format,
     images::{ImageSize, Images},
     navtech_png::{self, ByteTen, METADATA_BYTES},
@@ -114,10 +114,7 @@ impl NavtechScans {
         let turn = |index| {
             let decoded = self.images.decode(index, rows.clone(), &mut pixels);
             let rows: Vec<_> = navtech_png::rows(&pixels, decoded.ok()?).collect();
-            let counts: Vec<u16> = rows.iter().map(|row| row.count).collect();
-            Some(EncoderTurn::new(&counts, |row| {
-                stamp::to_ns(rows.get(row)?.stamp)
-            }))
+            Some(turn_of(&rows))
         };
         (0..FIRST_TURNS).filter_map(turn).collect()
     }

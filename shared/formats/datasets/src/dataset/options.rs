@@ -1,5 +1,6 @@
 //! Options for reading a dataset.
 
+use std::fmt;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -18,6 +19,15 @@ pub enum AzimuthSource {
     Encoder,
     /// Uniform spacing: row `i` of `n` at `2 pi i / n`.
     Uniform,
+}
+
+impl fmt::Display for AzimuthSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Encoder => "encoder",
+            Self::Uniform => "uniform",
+        })
+    }
 }
 
 /// The way to treat azimuths that the host of a radar has lost.
@@ -137,7 +147,7 @@ impl DatasetOptions {
     pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
         let (key, value) = match (self.encoder_counts, self.azimuth_source) {
             (Some(counts), _) => ("encoder_counts", counts.to_string()),
-            (_, Some(AzimuthSource::Encoder)) => ("azimuth_source", "encoder".to_owned()),
+            (_, Some(source @ AzimuthSource::Encoder)) => ("azimuth_source", source.to_string()),
             _ => return Ok(()),
         };
         let reason = "its images have no encoder counts";

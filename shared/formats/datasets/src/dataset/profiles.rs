@@ -159,6 +159,14 @@ pub(crate) const KNOWN: [Known; 8] = [
     ),
 ];
 
+impl Format {
+    /// The folders that hold its images, relative to a recording, the usual one first.
+    pub fn folders(self) -> &'static [&'static str] {
+        let known = KNOWN.iter().find(|known| known.0 == self);
+        known.map_or(&[], |known| known.1)
+    }
+}
+
 impl Profile {
     pub(crate) fn without_rows(range_resolution_m: f32, options: &DatasetOptions) -> Self {
         let profile = Self {

@@ -117,6 +117,15 @@ impl Sweep {
     }
 }
 
+/// Writes `n` sweeps, each named by its start; `change` gives them other properties.
+pub fn write_sweeps(folder: &Path, n: i64, change: impl Fn(i64, &mut Sweep)) {
+    for k in 0..n {
+        let mut sweep = Sweep::at(START_US + k * PERIOD_US);
+        change(k, &mut sweep);
+        sweep.write(&folder.join(format!("{}.png", sweep.start)));
+    }
+}
+
 /// Writes `n` Oxford scans to `root/radar`, and returns their files in order.
 pub fn write_oxford(root: &Path, n: i64) -> Vec<PathBuf> {
     let starts = || (0..n).map(|k| START_US + k * PERIOD_US);

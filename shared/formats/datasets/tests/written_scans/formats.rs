@@ -139,8 +139,12 @@ fn folders_without_a_dataset_are_rejected() {
     refused("", &["holds no PNG images"]);
     fs::write(root.path().join("points.las"), "LASF").unwrap();
     refused("", &["Navtech_Polar", "set its `format`", "bags of ROS 2"]);
+    refused("", &["(unpack archives before)"]);
     refused("", &Format::ALL.map(Format::name));
-    refused("points.las", &["is a file: give the folder"]);
+    refused(
+        "points.las",
+        &["is a file: give the folder", "(unpack an archive"],
+    );
     let configured = options(|o| o.format = Some(Format::Oxford));
     for expected in [
         "says `format = \"oxford\"`, but it holds neither PNG images nor the folder radar;",
@@ -203,15 +207,6 @@ fn options_are_kebab_case_and_unknown_keys_are_rejected() {
         let written = serde_json::to_string(&format).unwrap();
         assert_eq!(written, format!("\"{format}\""));
     }
-}
-
-#[test]
-fn a_file_is_refused_with_what_to_do() {
-    let root = folder();
-    let file = root.path().join("radar.zip");
-    fs::write(&file, b"PK\x03\x04....").unwrap();
-    assert_rejected(&file, "(unpack an archive before)");
-    assert_rejected(root.path(), "(unpack archives before)");
 }
 
 #[test]

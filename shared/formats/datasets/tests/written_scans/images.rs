@@ -11,9 +11,10 @@ use gyre_datasets::{DatasetOptions, Format, LostAzimuthOption, inspect, open, re
 use gyre_geometry::{OwnedScan, scan::flag};
 use gyre_radar::lost::stale_rows;
 
-use super::{assert_rejected, first_scan, folder, opened, options};
+use super::{folder, opened, options};
 use crate::common::{
     PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_png, write_radiate,
+    write_sweeps,
 };
 
 fn assert_powers(scan: &OwnedScan) {
@@ -165,56 +166,46 @@ fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
 }
 
 #[test]
-fn an_unknown_chunk_is_reported_in_plain_words() {
+fn images_of_other_content_are_refused_in_plain_words() {
     let root = folder();
     let file = write_oxford(root.path(), 1).remove(0);
     let valid = fs::read(&file).unwrap();
-    let mut bytes = valid.clone();
-    // After the header: length 0, a critical chunk named by four zeros, its checksum.
-    bytes.splice(33..33, [0, 0, 0, 0, 0, 0, 0, 0, 0x21, 0x44, 0xdf, 0x1c]);
-    fs::write(&file, bytes).unwrap();
-    let error = first_scan(root.path()).unwrap_err().to_string();
-    assert!(error.contains("Unrecognized critical chunk"), "{error}");
-    assert!(!error.contains(['{', '\0']), "{error}");
-    let mut bytes = valid;
-    bytes[30] ^= 1;
-    fs::write(&file, bytes).unwrap();
-    assert_refused(first_scan(root.path()), "CRC error");
-}
-
-#[test]
-fn other_pixels_than_grey_bytes_are_rejected() {
-    let root = folder();
-    let files = write_oxford(root.path(), 2);
-    let file = fs::File::create(&files[1]).unwrap();
-    let mut encoder = png::Encoder::new(file, 71, 40);
-    encoder.set_color(png::ColorType::Rgb);
-    let mut writer = encoder.write_header().unwrap();
-    writer.write_image_data(&[0; 71 * 40 * 3]).unwrap();
-    assert_refused(read(opened(root.path()).as_mut(), 1), "8-bit colour");
-}
-
-#[test]
-fn an_oversized_header_allocates_no_memory() {
-    let root = folder();
-    let files = write_oxford(root.path(), 1);
-    let mut bytes = fs::read(&files[0]).unwrap();
-    bytes[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
-    fs::write(&files[0], bytes).unwrap();
-    assert_rejected(root.path(), "is too large for a radar scan");
+    type Edit = fn(&mut Vec<u8>);
+    let edits: [(Edit, &str); 4] = [
+        // After the header: length 0, a critical chunk named by four zeros, its checksum.
+        (
+            |bytes| {
+                bytes.splice(33..33, [0, 0, 0, 0, 0, 0, 0, 0, 0x21, 0x44, 0xdf, 0x1c]);
+            },
+            "Unrecognized critical chunk",
+        ),
+        (|bytes| bytes[30] ^= 1, "CRC error"),
+        (|bytes| bytes[25] = 2, "8-bit colour"),
+        // No memory is allocated for it.
+        (
+            |bytes| bytes[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff].repeat(2)),
+            "is too large for a radar scan",
+        ),
+    ];
+    for (edit, words) in edits {
+        let mut bytes = valid.clone();
+        edit(&mut bytes);
+        fs::write(&file, bytes).unwrap();
+        let scan = open(root.path(), &DatasetOptions::default())
+            .map_err(|error| error.to_string())
+            .and_then(|mut dataset| read(dataset.as_mut(), 0).map_err(|error| error.to_string()));
+        let error = scan.err().unwrap_or_default();
+        assert!(error.contains(words), "{error}");
+        assert!(!error.contains(['{', '\0']), "{error}");
+    }
 }
 
 #[test]
 fn the_first_images_count_once_among_the_sizes() {
     let root = folder();
-    for k in 0..20 {
-        let start = START_US + k * PERIOD_US;
-        let sweep = Sweep {
-            bins: if k < 8 { 30 } else { 60 },
-            ..Sweep::at(start)
-        };
-        sweep.write(&root.path().join(format!("navtech/{start}.png")));
-    }
+    write_sweeps(&root.path().join("navtech"), 20, |k, sweep| {
+        sweep.bins = if k < 8 { 30 } else { 60 };
+    });
     assert_eq!(opened(root.path()).image_size().width, 71);
 }
 

@@ -1,13 +1,12 @@
 //! The rows of a sweep: encoders, validity, chirps.
 
 use std::f32::consts::TAU;
-use std::path::Path;
 
-use gyre_datasets::{AzimuthSource, Dataset, Format, open};
+use gyre_datasets::{AzimuthSource, Format, open};
 use gyre_geometry::scan::flag;
 
 use super::{first_scan, first_scan_with, folder, options};
-use crate::common::{PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford};
+use crate::common::{PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_sweeps};
 
 #[test]
 fn rows_that_are_not_one_sweep_are_rejected() {
@@ -87,19 +86,6 @@ fn byte_ten_is_validity_in_oxford_unused_in_boreas_and_the_chirps_if_it_alternat
     assert!(pairs.all(|pair| pair == [known | flag::CHIRP_UP, known]));
 }
 
-fn write_navtech(root: &Path, scans: i64, sweep: &Sweep) {
-    for k in 0..scans {
-        let start = START_US + k * PERIOD_US;
-        let sweep = Sweep { start, ..*sweep };
-        sweep.write(&root.join(format!("navtech/{start}.png")));
-    }
-}
-
-fn open_navtech(root: &Path, format: Format) -> Box<dyn Dataset> {
-    let options = options(|o| o.format = Some(format));
-    open(&root.join("navtech"), &options).unwrap()
-}
-
 #[test]
 fn the_size_of_an_encoder_is_that_with_which_a_turn_is_a_turn() {
     for (counts, step, first_count) in [
@@ -111,17 +97,14 @@ fn the_size_of_an_encoder_is_that_with_which_a_turn_is_a_turn() {
         let root = folder();
         // The last step is shorter than the others where the counts are no multiple.
         let rows = counts / usize::from(step) + usize::from(counts % usize::from(step) > 0);
-        let sweep = Sweep {
-            rows,
-            step,
-            first_count,
-            counts,
-            row_interval: PERIOD_US / rows as i64,
-            ..Sweep::default()
-        };
-        write_navtech(root.path(), 3, &sweep);
+        let images = root.path().join("navtech");
+        write_sweeps(&images, 3, |_, sweep| {
+            (sweep.rows, sweep.step, sweep.counts) = (rows, step, counts);
+            sweep.first_count = first_count;
+            sweep.row_interval = PERIOD_US / rows as i64;
+        });
         for format in [Format::Boreas, Format::Fomo, Format::Oxford] {
-            let mut dataset = open_navtech(root.path(), format);
+            let mut dataset = open(&images, &options(|o| o.format = Some(format))).unwrap();
             let taken = if counts == 5595 { 5600 } else { counts };
             assert_eq!(dataset.encoder_counts(), Some(taken as u16), "{format}");
             let notes = dataset.notes().join(" ");

@@ -8,7 +8,7 @@ use gyre_datasets::{Dataset, DatasetOptions, Format, inspect, open, reopen};
 
 use super::{assert_rejected, folder, opened, options};
 use crate::common::{
-    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_radiate,
+    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_radiate, write_sweeps,
 };
 
 /// Writes a scan of the turn `k`.
@@ -145,14 +145,9 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
         ("navtech", Format::Fomo),
     ] {
         let root = folder();
-        for k in 0..6 {
-            let start = START_US + k * PERIOD_US;
-            let sweep = Sweep {
-                rows: rows_of(k),
-                ..Sweep::at(start)
-            };
-            sweep.write(&root.path().join(name).join(format!("{start}.png")));
-        }
+        write_sweeps(&root.path().join(name), 6, |k, sweep| {
+            sweep.rows = rows_of(k);
+        });
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), format);
         assert_eq!(dataset.image_size().height, 40);
@@ -180,15 +175,10 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
 #[test]
 fn an_image_without_encoder_and_with_half_a_turn_is_refused() {
     let root = folder();
-    for k in 0..4 {
-        let start = START_US + k * PERIOD_US;
-        let sweep = Sweep {
-            rows: if k == 0 { 20 } else { 40 },
-            ..Sweep::at(start)
-        };
-        let name = format!("Navtech_CTS350-X_Radar/{start}.png");
-        sweep.write(&root.path().join(name));
-    }
+    let images = root.path().join("Navtech_CTS350-X_Radar");
+    write_sweeps(&images, 4, |k, sweep| {
+        sweep.rows = if k == 0 { 20 } else { 40 };
+    });
     let mut dataset = opened(root.path());
     let expected = "most images of the dataset are 71 columns x 40 rows";
     assert_refused(read(dataset.as_mut(), 0), expected);
@@ -196,27 +186,46 @@ fn an_image_without_encoder_and_with_half_a_turn_is_refused() {
 }
 
 #[test]
-fn radiate_times_that_are_off_do_not_move_the_other_scans() {
+fn radiate_times_that_are_off_do_not_move_the_scans_and_are_named() {
     let root = folder();
-    write_radiate(root.path(), 12);
+    write_radiate(root.path(), 40);
     let stamps = || -> Vec<_> {
         let dataset = opened(root.path());
-        let stamps = (0..12).map(|index| dataset.nominal_stamp_ns(index));
+        let stamps = (0..40).map(|index| dataset.nominal_stamp_ns(index).unwrap());
         stamps.collect()
     };
     let expected = stamps();
     let list = root.path().join("Navtech_Polar.txt");
     let text = fs::read_to_string(&list).unwrap();
-    // A year, or a minute, before or after; a byte order mark is no part of the list.
-    for off in ["1518450608", "1549986548", "1549986668", "1581522608"] {
-        let time = "Frame: 000011 Time: 1549986608";
-        let wrong = text.replace(time, &format!("Frame: 000011 Time: {off}"));
+    let far =
+        "1 times in Navtech_Polar.txt are more than 10 s from those before and after (frames 11)";
+    let frame_11 = "Frame: 000011 Time: 1549986608";
+    // A year, or a minute, before or after; a byte order mark is no part of the list. Frame 20 was
+    // received 3.253 s after the first second, and is logged 0.7 s before that.
+    for (time, off, sentence) in [
+        (frame_11, "Frame: 000011 Time: 1518450608", far),
+        (frame_11, "Frame: 000011 Time: 1549986548", far),
+        (frame_11, "Frame: 000011 Time: 1549986668", far),
+        (frame_11, "Frame: 000011 Time: 1581522608", far),
+        (
+            "1549986610.253000000",
+            "1549986609.553000000",
+            "(frames 20 by 0.70 s)",
+        ),
+    ] {
+        let wrong = text.replace(time, off);
         assert_ne!(wrong, text);
         fs::write(&list, format!("\u{feff}{wrong}")).unwrap();
-        assert_eq!(stamps(), expected, "{off}");
-        let notes = opened(root.path()).notes().join(" ");
-        let sentence = "1 times in Navtech_Polar.txt are more than 10 s from those before and after (frames 11)";
-        assert!(notes.contains(sentence), "{notes}");
+        for (now, before) in stamps().iter().zip(&expected) {
+            assert!((now - before).abs() < 1_000, "{off}: {now}, not {before}");
+        }
+        let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+        let (findings, timing) = (report.findings.join(" "), &report.figures["timing"]);
+        assert!(findings.contains(sentence), "{findings}");
+        assert!((timing["period_s"].as_f64().unwrap() - 0.25).abs() < 1e-6);
+        for list in ["stalls", "backwards", "gaps"] {
+            assert_eq!(timing[list].as_array().unwrap().len(), 0, "{list}");
+        }
     }
 }
 
@@ -233,33 +242,4 @@ fn a_list_without_all_times_is_named_with_the_first_image_that_it_lacks() {
     fs::remove_file(&list).unwrap();
     let words = format!("there is no {}: it lists the times", list.display());
     assert_rejected(root.path(), &words);
-}
-
-#[test]
-fn one_time_that_is_early_moves_no_scan_and_is_named() {
-    let root = folder();
-    write_radiate(root.path(), 40);
-    let stamps = || -> Vec<_> {
-        let dataset = opened(root.path());
-        let stamps = (0..40).map(|index| dataset.nominal_stamp_ns(index).unwrap());
-        stamps.collect()
-    };
-    let expected = stamps();
-    let list = root.path().join("Navtech_Polar.txt");
-    let text = fs::read_to_string(&list).unwrap();
-    // Frame 20 was received 3.253 s after the first second, and is logged 0.7 s before that.
-    let early = text.replace("1549986610.253000000", "1549986609.553000000");
-    assert_ne!(early, text);
-    fs::write(&list, early).unwrap();
-    for (now, before) in stamps().iter().zip(&expected) {
-        assert!((now - before).abs() < 1_000, "{now} instead of {before}");
-    }
-    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
-    let findings = report.findings.join(" ");
-    assert!(findings.contains("(frames 20 by 0.70 s)"), "{findings}");
-    let timing = &report.figures["timing"];
-    assert!((timing["period_s"].as_f64().unwrap() - 0.25).abs() < 1e-6);
-    for list in ["stalls", "backwards", "gaps"] {
-        assert_eq!(timing[list].as_array().unwrap().len(), 0, "{list}");
-    }
 }

@@ -77,7 +77,10 @@ impl Survey {
                 .ok()
                 .and_then(|m| Some(sample(m.azimuth().ok()?.encoder, 1, m.data.len()))),
             Kind::BScans => of::<RadarBScanMsg>(message).ok().map(|m| {
-                self.turns.push(written(&m.encoder_values, &m.timestamps));
+                let shown = |(_, value, time): (usize, u16, u64)| {
+                    (value, i64::try_from(time).unwrap_or_default())
+                };
+                self.turns.push(m.written().map(shown).collect());
                 of_image(&m.b_scan_img)
             }),
             Kind::Images => of::<Image>(message).ok().map(|image| of_image(&image)),
@@ -192,19 +195,6 @@ fn turn_time(turns: &[&[RowShown]]) -> Option<(i64, i64)> {
         let starts_ns = starts.clone().map(|start| start.saturating_mul(unit_ns));
         Some((unit_ns, turn_ns(starts_ns)?))
     })
-}
-
-/// Returns the rows that the driver has written.
-fn written(encoder_values: &[u16], times: &[u64]) -> Vec<RowShown> {
-    let mut written: Vec<RowShown> = Vec::with_capacity(encoder_values.len());
-    let has_clock = times.iter().any(|time| *time != 0);
-    for (value, time) in encoder_values.iter().zip(times) {
-        let is_written = *time != 0 || !has_clock;
-        if is_written && written.last().is_none_or(|(last, _)| last < value) {
-            written.push((*value, i64::try_from(*time).unwrap_or_default()));
-        }
-    }
-    written
 }
 
 #[cfg(test)]

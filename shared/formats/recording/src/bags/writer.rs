@@ -282,13 +282,3 @@ fn description(file: &str, topics: &[Described], times: Option<(i64, i64)>) -> S
 fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_quoted() {
-        assert_eq!(quoted("a \"b\" \\ \n\u{7}"), r#""a \"b\" \\ \n\u0007""#);
-    }
-}

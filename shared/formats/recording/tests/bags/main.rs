@@ -93,6 +93,15 @@ fn opened(path: &Path) -> Box<dyn Dataset> {
     open(path, &DatasetOptions::default()).unwrap()
 }
 
+/// A known depth of a range bin, and perhaps the encoder's counts per turn.
+fn with(encoder_counts: Option<u16>) -> DatasetOptions {
+    DatasetOptions {
+        range_resolution_m: Some(0.0438),
+        encoder_counts,
+        ..DatasetOptions::default()
+    }
+}
+
 fn refused(path: &Path) -> String {
     let Err(error) = open(path, &DatasetOptions::default()) else {
         panic!("{} was opened", path.display());
@@ -285,11 +294,7 @@ fn without_a_configuration_the_depth_of_a_bin_must_be_given() {
             sentence.contains("dataset.range_resolution_m"),
             "{sentence}"
         );
-        let options = DatasetOptions {
-            range_resolution_m: Some(0.0438),
-            ..DatasetOptions::default()
-        };
-        let mut dataset = open(&path, &options).unwrap();
+        let mut dataset = open(&path, &with(None)).unwrap();
         assert_has_turns(dataset.as_mut(), 4);
         let notes = dataset.notes().join(" ");
         assert!(notes.contains("does not describe itself"), "{notes}");

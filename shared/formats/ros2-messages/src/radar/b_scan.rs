@@ -38,10 +38,21 @@ impl RadarBScanMsg {
         }
         let arrival_ns = arrival(radar, arrived_ns);
         let unit_ns = unit_ns(radar, encoders, stamps);
+        Ok(self
+            .written()
+            .map(move |(row, encoder, stamp)| TimedAzimuth {
+                azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
+                arrived_ns: arrival_ns(encoder),
+            }))
+    }
+
+    /// Returns the rows that the driver has written: their numbers, encoder values and times.
+    pub fn written(&self) -> impl Iterator<Item = (usize, u16, u64)> + '_ {
+        let (encoders, stamps) = (&self.encoder_values, &self.timestamps);
         let has_clock = stamps.iter().any(|stamp| *stamp != 0);
         let has_turned = encoders.iter().any(|encoder| *encoder != 0);
         let mut last = None;
-        let written = move |(row, encoder, stamp): &(usize, u16, u64)| {
+        let is_next = move |(row, encoder, stamp): &(usize, u16, u64)| {
             let is_written = match has_clock {
                 true => *stamp != 0,
                 false => *encoder != 0 || (*row == 0 && has_turned),
@@ -54,11 +65,7 @@ impl RadarBScanMsg {
         };
         let places = encoders.iter().zip(stamps).enumerate();
         let places = places.map(|(row, (encoder, stamp))| (row, *encoder, *stamp));
-        let rows = places.filter(written);
-        Ok(rows.map(move |(row, encoder, stamp)| TimedAzimuth {
-            azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
-            arrived_ns: arrival_ns(encoder),
-        }))
+        places.filter(is_next)
     }
 }
 
