@@ -15,7 +15,7 @@ fn step(step: usize) -> NonZeroUsize {
 }
 
 fn matched(estimate: &[Pose], truth: &[Pose]) -> MatchedPoses {
-    MatchedPoses::new(estimate.to_vec(), truth.to_vec()).unwrap()
+    MatchedPoses::new(estimate.to_vec(), truth.to_vec())
 }
 
 /// Chains the motions from pose to pose after `change`.

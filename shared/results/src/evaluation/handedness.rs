@@ -227,7 +227,7 @@ mod tests {
     }
 
     fn resolve(estimate: Vec<Pose>, truth: Vec<Pose>) -> Axes {
-        resolve_axes(MatchedPoses::new(estimate, truth).unwrap()).1
+        resolve_axes(MatchedPoses::new(estimate, truth)).1
     }
 
     fn with(poses: Vec<Pose>, y: bool, heading: bool) -> Vec<Pose> {
@@ -244,7 +244,7 @@ mod tests {
                 ..Axes::default()
             };
             let changed = with(drive(), y, heading);
-            let matched = MatchedPoses::new(changed.clone(), drive()).unwrap();
+            let matched = MatchedPoses::new(changed.clone(), drive());
             let (resolved, found) = resolve_axes(matched);
             assert_eq!(resolved.estimate(), drive());
             assert_eq!(found, axes(HeadingFault::Estimate));

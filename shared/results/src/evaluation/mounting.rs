@@ -45,7 +45,7 @@ mod tests {
             (0..300).map(step).collect()
         };
         let found = |estimate, truth| {
-            let matched = MatchedPoses::new(estimate, truth).unwrap();
+            let matched = MatchedPoses::new(estimate, truth);
             heading_offset_rad(&matched, &align(&matched))
         };
         for offset in [-1.5, 0.3, 3.1] {
