@@ -21,7 +21,7 @@ use gyre_configuration::{
 use gyre_contract::StageId;
 use gyre_datasets::ground_truth::{find_ground_truth, read_trajectory};
 use gyre_radar::Trajectory;
-use pass::{MOST_JUDGED, Pass, Read};
+use pass::{MOST_JUDGED, Read};
 use slam::Slam;
 
 use crate::{
@@ -53,8 +53,8 @@ pub fn write(
     let truth = truth_of(configuration, out.path());
     let mut slam = slam_of(configuration, out);
     let mut files = Files::new(out);
-    let pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
-    let read = pass.over(out.path())?;
+    let (resumed, is_judged) = (session.resumed, truth.is_some());
+    let read = pass::read(&mut files, out.path(), resumed, is_judged, slam.as_ref())?;
     let mut corrected = None;
     if let Some(slam) = &mut slam {
         corrected = Some(add_corrected(&mut files, slam, truth.as_deref(), &read)?);

@@ -44,28 +44,29 @@ pub fn associate(
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     require_poses(ESTIMATE, &estimate.poses)?;
     require_poses(TRUTH, &truth.poses)?;
-    match estimate.stamps().is_empty() || truth.stamps().is_empty() {
+    let (matched, coverage) = match estimate.stamps().is_empty() || truth.stamps().is_empty() {
         true => by_index(&estimate.poses, &truth.poses),
-        false => by_time(estimate, truth),
+        false => by_time(estimate, truth)?,
+    };
+    match matched.len() {
+        count @ 0..2 => Err(EvaluationError(format!(
+            "{count} of {} estimated poses could be associated with the {} poses of the ground truth; at least 2 are needed",
+            estimate.poses.len(),
+            truth.poses.len()
+        ))),
+        _ => Ok((matched, coverage)),
     }
 }
 
-fn by_index(
-    estimate: &[Pose],
-    truth: &[Pose],
-) -> Result<(MatchedPoses, Coverage), EvaluationError> {
+fn by_index(estimate: &[Pose], truth: &[Pose]) -> (MatchedPoses, Coverage) {
     let matched = estimate.len().min(truth.len());
-    if matched < 2 {
-        let given = [estimate.len(), truth.len()];
-        return Err(EvaluationError::too_few(matched, given));
-    }
     let coverage = Coverage::Index {
         matched,
         estimate_surplus: estimate.len() - matched,
         truth_surplus: truth.len() - matched,
     };
     let [estimate, truth] = [estimate, truth].map(|poses| poses[..matched].to_vec());
-    Ok((MatchedPoses::new(estimate, truth), coverage))
+    (MatchedPoses::new(estimate, truth), coverage)
 }
 
 fn by_time(
@@ -98,10 +99,6 @@ fn by_time(
         return Err(EvaluationError(format!(
             "the trajectories do not overlap in time: estimate {estimate}, ground truth {truth} (same clock, same unit?)"
         )));
-    }
-    if matched < 2 {
-        let given = [estimate.poses.len(), truth.poses.len()];
-        return Err(EvaluationError::too_few(matched, given));
     }
     let coverage = Coverage::Time {
         matched,

@@ -210,12 +210,12 @@ impl fmt::Display for Axes {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use gyre_geometry::pose;
 
     /// A drive with bends to both sides, more to the left.
-    fn drive() -> Vec<Pose> {
+    pub fn drive() -> Vec<Pose> {
         let mut here = pose(3.0, -2.0, 0.4);
         (0..300)
             .map(|k| {
