@@ -1,7 +1,7 @@
 //! Datasets of each format: written, read by the readers for real data, interrupted, resumed, and
 //! streamed without a disk.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{fs, path::Path};
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, read_trajectory};
 use gyre_geometry::{OwnedScan, Pose};
@@ -169,44 +169,30 @@ fn a_stalling_host_shifts_the_logged_times_and_not_the_sensors_clock() {
 }
 
 #[test]
-fn an_interrupted_dataset_is_completed() {
-    let config = config(OutputFormat::Boreas, 6);
-    let whole = written(&config);
-    let cut = written(&config);
-    let images = fs::read_dir(cut.path().join("radar"))
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    let images: BTreeMap<_, _> = images.map(|path| (path.clone(), path)).collect();
-    let images: Vec<_> = images.into_values().collect();
-    // One image is missing, one is incomplete, the others are complete.
-    fs::remove_file(&images[2]).unwrap();
-    let name = images[4].file_name().unwrap().to_str().unwrap();
-    fs::rename(&images[4], images[4].with_file_name(format!(".{name}.tmp"))).unwrap();
-    fs::remove_file(cut.path().join("ground_truth.tum")).unwrap();
-    let untouched = fs::metadata(&images[1]).unwrap().modified().unwrap();
-    let mut seen = Vec::new();
-    let summary = write_dataset(&config, cut.path(), None, &mut |done, total| {
-        seen.push((done, total))
-    })
-    .unwrap();
-    assert_eq!((summary.scans, summary.kept), (6, 4));
-    assert!((summary.duration_s - 1.25).abs() < 1e-9 && summary.path_m > 2.0);
-    assert_eq!(seen, [(4, 6), (5, 6), (6, 6)]);
-    assert_eq!(
-        fs::metadata(&images[1]).unwrap().modified().unwrap(),
-        untouched
-    );
-    assert!(all_files(cut.path()) == all_files(whole.path()));
-}
-
-#[test]
-fn a_dataset_is_extended_by_more_scans() {
+fn an_interrupted_dataset_is_completed_and_extended_by_more_scans() {
     for format in FORMATS {
-        let folder = written(&config(format, 3));
-        let summary = write(&config(format, 5), folder.path()).unwrap();
-        assert_eq!((summary.scans, summary.kept), (5, 3));
+        let (cut, config) = (written(&config(format, 5)), config(format, 6));
+        let drive = SimulatedDrive::new(&config).unwrap();
+        let image = |index: usize| {
+            let folder = cut.path().join(drive.image_folder());
+            folder.join(drive.image_name(index))
+        };
+        // One image is missing, one is incomplete, the others are complete.
+        fs::remove_file(image(2)).unwrap();
+        let draft = format!(".{}.tmp", drive.image_name(4));
+        fs::rename(image(4), image(4).with_file_name(draft)).unwrap();
+        fs::remove_file(cut.path().join("ground_truth.tum")).unwrap();
+        let modified = || fs::metadata(image(1)).unwrap().modified().unwrap();
+        let (untouched, mut seen) = (modified(), Vec::new());
+        let mut see = |done: usize, total: usize| seen.push((done, total));
+        let summary = write_dataset(&config, cut.path(), None, &mut see).unwrap();
+        assert_eq!((summary.scans, summary.kept), (6, 3));
+        assert!((summary.duration_s - 1.25).abs() < 1e-9 && summary.path_m > 2.0);
+        assert_eq!(seen, [(3, 6), (4, 6), (5, 6), (6, 6)]);
+        assert_eq!(modified(), untouched);
+        let whole = written(&config);
         assert!(
-            all_files(folder.path()) == all_files(written(&config(format, 5)).path()),
+            all_files(cut.path()) == all_files(whole.path()),
             "{format:?}"
         );
     }
