@@ -138,12 +138,10 @@ fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
         _ => drive.study(&out.join(format!("calibration-{}.svg", k + 1))),
     });
     let mut studies: Vec<Study> = studies.collect::<Result<_, _>>()?;
-    let others = studies.split_off(1);
-    let first = studies.remove(0);
-    if others.is_empty() {
-        return Ok(first.found);
+    if studies.len() == 1 {
+        return Ok(studies.remove(0).found);
     }
-    let found = first.combined(&others)?;
+    let found = Study::combined(&studies)?;
     print::line(format_args!("all together: {found}"))?;
     Ok(found)
 }

@@ -47,10 +47,10 @@ impl PoseHeader {
 
     /// Returns the motion from the first scan to this one, to compose it with the next.
     pub fn composed(&self) -> ComposedMotion {
-        ComposedMotion::resume(
-            self.pose(),
-            covariance::unpack(&self.accumulated_covariance),
-        )
+        ComposedMotion {
+            motion: self.pose(),
+            accumulated: covariance::unpack(&self.accumulated_covariance),
+        }
     }
 }
 
@@ -77,7 +77,7 @@ pub fn compose(previous: Option<&PoseHeader>, motion: &MotionHeader) -> PoseHead
     let start = PoseHeader::default();
     let previous = previous.unwrap_or(&start);
     let next = previous.composed().then(&motion.motion.motion());
-    let pose = next.motion();
+    let pose = next.motion;
     let [x_m, y_m, yaw_rad] = xy_yaw(&pose.motion);
     PoseHeader {
         item: motion.item,
@@ -86,7 +86,7 @@ pub fn compose(previous: Option<&PoseHeader>, motion: &MotionHeader) -> PoseHead
         y_m,
         yaw_rad,
         covariance: covariance::pack(&pose.covariance),
-        accumulated_covariance: covariance::pack(&next.accumulated()),
+        accumulated_covariance: covariance::pack(&next.accumulated),
         trajectory_version: previous.trajectory_version,
     }
 }
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn poses_are_those_of_motions_composed_without_messages() {
         let mut header: Option<PoseHeader> = None;
-        let mut composed = ComposedMotion::new();
+        let mut composed = ComposedMotion::default();
         for k in 0..1000 {
             let at = f64::from(k);
             let moves = if k % 7 == 0 { 0.0 } else { 1.0 };

@@ -88,34 +88,36 @@ impl OdometryMotion {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ComposedMotion {
-    motion: Pose,
-    covariance: Matrix3<f64>,
-    /// The first two terms of the covariance, which further motions carry on.
-    accumulated: Matrix3<f64>,
+    pub motion: UncertainMotion,
+    /// The first two terms of the covariance, which further motions carry on: the drift, and the
+    /// noise where the first motion begins.
+    pub accumulated: Matrix3<f64>,
+}
+
+impl Default for ComposedMotion {
+    fn default() -> Self {
+        Self {
+            motion: UncertainMotion::identity(),
+            accumulated: Matrix3::zeros(),
+        }
+    }
 }
 
 impl ComposedMotion {
-    pub fn new() -> Self {
-        Self::resume(UncertainMotion::identity(), Matrix3::zeros())
-    }
-
     pub fn of(first: &OdometryMotion) -> Self {
         // A vehicle that stands keeps the noise that the pose has here.
-        let start = UncertainMotion {
-            covariance: first.noise(),
-            ..UncertainMotion::identity()
-        };
-        let mut composed = Self::resume(start, Matrix3::zeros()).then(first);
-        composed.covariance += first.noise();
+        let mut start = Self::default();
+        start.motion.covariance = first.noise();
+        let mut composed = start.then(first);
+        composed.motion.covariance += first.noise();
         composed.accumulated += first.noise();
         composed
     }
 
-    pub fn resume(composed: UncertainMotion, accumulated: Matrix3<f64>) -> Self {
-        Self {
-            motion: composed.motion,
-            covariance: composed.covariance,
-            accumulated,
+    fn accumulated_motion(&self) -> UncertainMotion {
+        UncertainMotion {
+            covariance: self.accumulated,
+            ..self.motion
         }
     }
 
@@ -124,55 +126,30 @@ impl ComposedMotion {
     /// two chains is in no covariance.
     #[must_use]
     pub fn then(&self, next: &OdometryMotion) -> Self {
-        let before = UncertainMotion {
-            motion: self.motion,
-            covariance: self.accumulated,
-        };
-        let after = before.then(&next.drift());
+        let mut motion = self.accumulated_motion().then(&next.drift());
+        let accumulated = motion.covariance;
         let at_the_end = if next.motion == Pose::identity() {
-            self.covariance - self.accumulated
+            self.motion.covariance - self.accumulated
         } else {
-            let turn = self.motion.rotation.to_rotation_matrix().to_homogeneous();
-            let [x_m, y_m, _] = xy_yaw(&after.motion);
+            let turn = self.motion.motion.rotation.to_rotation_matrix();
+            let turn = turn.to_homogeneous();
+            let [x_m, y_m, _] = xy_yaw(&motion.motion);
             let by_scale = Vector3::new(x_m, y_m, 0.0) * next.scale_sigma;
             turn * next.noise() * turn.transpose() + by_scale * by_scale.transpose()
         };
+        motion.covariance += at_the_end;
         Self {
-            motion: after.motion,
-            covariance: after.covariance + at_the_end,
-            accumulated: after.covariance,
+            motion,
+            accumulated,
         }
-    }
-
-    pub fn motion(&self) -> UncertainMotion {
-        UncertainMotion {
-            motion: self.motion,
-            covariance: self.covariance,
-        }
-    }
-
-    /// Returns the part of the covariance that further motions carry on: the drift, and the noise
-    /// where the first motion begins.
-    pub fn accumulated(&self) -> Matrix3<f64> {
-        self.accumulated
     }
 
     #[must_use]
     pub fn normalized(&self) -> Self {
-        let accumulated = UncertainMotion {
-            motion: self.motion,
-            covariance: self.accumulated,
-        };
-        Self::resume(
-            self.motion().normalized(),
-            accumulated.normalized().covariance,
-        )
-    }
-}
-
-impl Default for ComposedMotion {
-    fn default() -> Self {
-        Self::new()
+        Self {
+            motion: self.motion.normalized(),
+            accumulated: self.accumulated_motion().normalized().covariance,
+        }
     }
 }
 
@@ -195,7 +172,7 @@ mod tests {
     fn composed(step: &OdometryMotion, count: usize) -> UncertainMotion {
         (1..count)
             .fold(ComposedMotion::of(step), |so_far, _| so_far.then(step))
-            .motion()
+            .motion
     }
 
     #[test]
@@ -241,9 +218,9 @@ mod tests {
         let (ahead, turn) = (exact(30.0, 0.0), exact(40.0, FRAC_PI_2));
         let end = [ahead, turn, ahead]
             .iter()
-            .fold(ComposedMotion::new(), |so_far, next| so_far.then(next));
+            .fold(ComposedMotion::default(), |so_far, next| so_far.then(next));
         let expected = Matrix3::new(49.0, 21.0, 0.0, 21.0, 9.0, 0.0, 0.0, 0.0, 0.0) * 1e-2;
-        assert!((end.motion().covariance - expected).norm() < 1e-12);
+        assert!((end.motion.covariance - expected).norm() < 1e-12);
     }
 
     #[test]
@@ -256,20 +233,20 @@ mod tests {
         };
         let after = arrived.then(&held).then(&held);
         let drift = held.drift().covariance * 2.0;
-        let turn = arrived.motion().motion.rotation.to_rotation_matrix();
+        let turn = arrived.motion.motion.rotation.to_rotation_matrix();
         let turn = turn.to_homogeneous();
-        let expected = arrived.motion().covariance + turn * drift * turn.transpose();
-        assert!((after.motion().covariance - expected).norm() < 1e-15);
-        assert_eq!(after.motion().motion, arrived.motion().motion);
+        let expected = arrived.motion.covariance + turn * drift * turn.transpose();
+        assert!((after.motion.covariance - expected).norm() < 1e-15);
+        assert_eq!(after.motion.motion, arrived.motion.motion);
     }
 
     #[test]
     fn the_start_of_a_new_chain_changes_nothing() {
         let arrived = ComposedMotion::of(&step(0.25, 0.01)).normalized();
         let after = arrived.then(&OdometryMotion::default()).normalized();
-        let apart = after.motion().covariance - arrived.motion().covariance;
+        let apart = after.motion.covariance - arrived.motion.covariance;
         assert!(apart.norm() < 1e-18);
-        assert_eq!(after.accumulated(), arrived.accumulated());
-        assert_eq!(after.motion().motion, arrived.motion().motion);
+        assert_eq!(after.accumulated, arrived.accumulated);
+        assert_eq!(after.motion.motion, arrived.motion.motion);
     }
 }

@@ -21,7 +21,7 @@ use gyre_configuration::{
 use gyre_contract::StageId;
 use gyre_datasets::ground_truth::{find_ground_truth, read_trajectory};
 use gyre_radar::Trajectory;
-use pass::{MOST_JUDGED, Pass, Read};
+use pass::{MOST_JUDGED, Read};
 use slam::Slam;
 
 use crate::{
@@ -53,8 +53,8 @@ pub fn write(
     let truth = truth_of(configuration, out.path());
     let mut slam = slam_of(configuration, out);
     let mut files = Files::new(out);
-    let pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
-    let read = pass.over(out.path())?;
+    let (resumed, is_judged) = (session.resumed, truth.is_some());
+    let mut read = pass::read(&mut files, out.path(), resumed, is_judged, slam.as_ref())?;
     let mut corrected = None;
     if let Some(slam) = &mut slam {
         corrected = Some(add_corrected(&mut files, slam, truth.as_deref(), &read)?);
@@ -74,18 +74,23 @@ pub fn write(
     for (name, plot) in plots {
         files.add(name, plot)?;
     }
-    let ended = read.end.is_some();
+    let (first, refines) = (
+        configuration.source.first,
+        configuration.has(StageId::Refinement),
+    );
     let measured = Measured {
+        course: read.counter.course(read.sketch.length_m),
+        counts: read.counter.counts(read.end.as_ref(), first, refines),
+        latency: read.latency.latency(),
         evaluation: judgement,
         slam: corrected,
         gnss,
-        ..measured(configuration, read)
     };
     let latency = serde_json::to_string_pretty(&measured.latency)?;
     files.add("latency.json", latency)?;
     let results = Results {
         poses: measured.counts.processed as usize,
-        ended,
+        ended: read.end.is_some(),
         summary: Summary::new(configuration, out.path(), session, measured),
     };
     files.add(SUMMARY, serde_json::to_string_pretty(&results.summary)?)?;
@@ -100,21 +105,6 @@ fn slam_of(configuration: &Configuration, out: &Out) -> Option<Slam> {
     let note = |reason: &Failure| print::note(format_args!("no corrected trajectory: {reason}"));
     let slam = Slam::read(configuration, out).inspect_err(note);
     slam.ok().flatten()
-}
-
-/// Returns the figures that the journal contains.
-fn measured(configuration: &Configuration, mut read: Read) -> Measured {
-    let refines = configuration.has(StageId::Refinement);
-    let course = read.counter.course(read.sketch.length_m);
-    let (end, first) = (read.end.as_ref(), configuration.source.first);
-    Measured {
-        counts: read.counter.counts(end, first, refines),
-        course,
-        latency: read.latency.latency(),
-        evaluation: None,
-        slam: None,
-        gnss: None,
-    }
 }
 
 pub fn truth_of(configuration: &Configuration, out: &Path) -> Option<PathBuf> {

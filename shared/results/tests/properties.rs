@@ -15,7 +15,7 @@ fn step(step: usize) -> NonZeroUsize {
 }
 
 fn matched(estimate: &[Pose], truth: &[Pose]) -> MatchedPoses {
-    MatchedPoses::new(estimate.to_vec(), truth.to_vec()).unwrap()
+    MatchedPoses::new(estimate.to_vec(), truth.to_vec())
 }
 
 /// Chains the motions from pose to pose after `change`.
@@ -101,20 +101,6 @@ proptest! {
     }
 
     #[test]
-    fn a_scale_error_on_a_straight_line_is_the_translation_error(percent in -5.0..5.0f64) {
-        // Steps of 1/8 m are exact in binary, so each segment ends 1/8 m beyond its length.
-        let line = |scale: f64| (0..8000).map(|k| pose(0.125 * f64::from(k) * scale, 0.0, 0.0)).collect::<Vec<_>>();
-        let m = matched(&line(1.0 + percent / 100.0), &line(1.0));
-        let result = kitti(&m, step(100)).unwrap();
-        for l in &result.by_length {
-            let expected = percent.abs() * (l.length_m + 0.125) / l.length_m;
-            prop_assert!((l.translation_percent - expected).abs() < 1e-9);
-        }
-        prop_assert!(result.rotation_deg_per_100m < 1e-12);
-        prop_assert!((rpe(&m).forward_ratio.unwrap() - (1.0 + percent / 100.0)).abs() < 1e-12);
-    }
-
-    #[test]
     fn seg_and_ate_do_not_depend_on_headings((n, bend) in any_drive(), bias in -3.0..3.0) {
         let truth = drive(n, bend);
         let noisy = rechained(&truth, |k, m| m * Pose::rotation(0.001 * (k as f64).sin()));
@@ -131,7 +117,9 @@ fn a_path_below_100_m_has_no_kitti_errors_but_rpe() {
     let estimate = rechained(&truth, |_, m| m * pose(0.1, 0.0, 0.0));
     let evaluation = by_index(&estimate, &truth, 10);
     assert!(evaluation.kitti.is_none() && evaluation.seg.is_none());
-    assert!((evaluation.rpe.as_ref().unwrap().translation_rmse_m - 0.1).abs() < 1e-9);
+    let rpe = evaluation.rpe.as_ref().unwrap();
+    assert!((rpe.translation_rmse_m - 0.1).abs() < 1e-9);
+    assert!((rpe.forward_ratio.unwrap() - 2.47 / 2.37).abs() < 1e-4);
     let table = evaluation.to_string();
     for words in [
         "the path is not longer than 100 m; use RPE",

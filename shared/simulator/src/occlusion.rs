@@ -17,9 +17,8 @@ pub struct WallGrid {
     corner: Point2<f64>,
     columns: usize,
     rows: usize,
-    /// `cell_start[c]..cell_start[c + 1]` is the part of `cell_walls` that cell `c` holds.
-    cell_start: Vec<u32>,
-    cell_walls: Vec<u32>,
+    /// The numbers of the walls in each cell.
+    cells: Vec<Vec<u32>>,
 }
 
 impl WallGrid {
@@ -35,8 +34,7 @@ impl WallGrid {
             corner: lowest,
             columns,
             rows,
-            cell_start: vec![0],
-            cell_walls: Vec::new(),
+            cells: Vec::new(),
         };
         let mut cells: Vec<Vec<u32>> = vec![Vec::new(); columns * rows];
         for (index, wall) in grid.walls.iter().enumerate() {
@@ -47,10 +45,7 @@ impl WallGrid {
                 }
             }
         }
-        for cell in cells {
-            grid.cell_walls.extend(cell);
-            grid.cell_start.push(grid.cell_walls.len() as u32);
-        }
+        grid.cells = cells;
         grid
     }
 
@@ -65,10 +60,8 @@ impl WallGrid {
         let mut walk = CellWalk::new(self, from, to);
         let mut entered = 0.0;
         while let Some((column, row, left)) = walk.next_cell() {
-            let starts = self.cell(column, row).map_or([0; 2], |cell| {
-                [cell, cell + 1].map(|cell| self.cell_start[cell] as usize)
-            });
-            for &index in &self.cell_walls[starts[0]..starts[1]] {
+            let cell = self.cell(column, row);
+            for &index in cell.into_iter().flat_map(|cell| &self.cells[cell]) {
                 let wall = &self.walls[index as usize];
                 // A wall lies in several cells, but the line crosses it in one of them only.
                 if let Some(share) =

@@ -8,55 +8,36 @@ const TILE_M: f64 = 16.0;
 
 #[derive(Clone, Debug)]
 pub struct World {
-    /// Tile by tile; within a tile in the given order.
-    scatterers: Vec<Scatterer>,
+    /// The scatterers of each tile in the given order, row by row.
+    tiles: Vec<Vec<Scatterer>>,
     corner: Point2<f64>,
     columns: usize,
-    rows: usize,
-    /// `tile_start[t]..tile_start[t + 1]` are the scatterers of tile `t`.
-    tile_start: Vec<usize>,
     pub walls: WallGrid,
 }
 
 impl World {
     pub fn new(content: Body) -> Self {
-        let Body {
-            mut scatterers,
-            walls,
-        } = content;
+        let Body { scatterers, walls } = content;
         let places = || scatterers.iter().map(|scatterer| scatterer.position);
         let origin = Point2::origin();
         let corner = places().fold(origin, |a, b| a.inf(&b));
         let size = (places().fold(origin, |a, b| a.sup(&b)) - corner) / TILE_M;
         let (columns, rows) = (size.x as usize + 1, size.y as usize + 1);
-        let tile = |scatterer: &Scatterer| {
+        let mut tiles = vec![Vec::new(); columns * rows];
+        for scatterer in scatterers {
             let place = (scatterer.position - corner) / TILE_M;
-            place.y as usize * columns + place.x as usize
-        };
-        scatterers.sort_by_cached_key(tile);
-        let mut tile_start = vec![0; columns * rows + 1];
-        for scatterer in &scatterers {
-            tile_start[tile(scatterer) + 1] += 1;
-        }
-        for index in 1..tile_start.len() {
-            tile_start[index] += tile_start[index - 1];
+            tiles[place.y as usize * columns + place.x as usize].push(scatterer);
         }
         Self {
-            scatterers,
+            tiles,
             corner,
             columns,
-            rows,
-            tile_start,
             walls: WallGrid::new(walls),
         }
     }
 
-    pub fn scatterers(&self) -> &[Scatterer] {
-        &self.scatterers
-    }
-
-    /// Runs of scatterers that include all within `reach_m` of a place, and some beyond.
-    pub fn around(&self, place: Point2<f64>, reach_m: f64) -> impl Iterator<Item = &[Scatterer]> {
+    /// Scatterers that include all within `reach_m` of a place, and some beyond.
+    pub fn around(&self, place: Point2<f64>, reach_m: f64) -> impl Iterator<Item = &Scatterer> {
         let low = (place - self.corner).add_scalar(-reach_m) / TILE_M;
         let high = (place - self.corner).add_scalar(reach_m) / TILE_M;
         let span = |low: f64, high: f64, end: usize| {
@@ -67,12 +48,10 @@ impl World {
             )
         };
         let (first, end) = span(low.x, high.x, self.columns);
-        let (top, bottom) = span(low.y, high.y, self.rows);
-        let row = move |row: usize| {
-            let tile = row * self.columns;
-            &self.scatterers[self.tile_start[tile + first]..self.tile_start[tile + end.max(first)]]
-        };
-        (top..bottom).map(row)
+        let rows = self.tiles.len() / self.columns;
+        let (top, bottom) = span(low.y, high.y, rows);
+        let rows = self.tiles.chunks(self.columns).take(bottom).skip(top);
+        rows.flat_map(move |row| row[first..end.max(first)].iter().flatten())
     }
 
     /// Two-way share of the power that passes between two points; walls of `body` are ignored.
@@ -103,7 +82,8 @@ mod tests {
             scatterers,
             walls: Vec::new(),
         });
-        assert_eq!(world.scatterers().len(), 800);
+        let all = || world.tiles.iter().flatten();
+        assert_eq!(all().count(), 800);
         for (place, reach_m) in [
             ((0.0, 0.0), 30.0),
             ((-300.0, 20.0), 250.0),
@@ -112,8 +92,8 @@ mod tests {
         ] {
             let place = Point2::new(place.0, place.1);
             let near = |s: &&Scatterer| (s.position - place).norm() <= reach_m;
-            let found = world.around(place, reach_m).flatten().filter(near).count();
-            assert_eq!(found, world.scatterers().iter().filter(near).count());
+            let found = world.around(place, reach_m).filter(near).count();
+            assert_eq!(found, all().filter(near).count());
         }
     }
 }

@@ -71,9 +71,10 @@ fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
             .max()
             .unwrap_or(0)
     };
-    let azimuth = (0..AZIMUTHS).max_by_key(|&azimuth| best(azimuth)).unwrap();
+    let azimuths = 0..scan.geometry.azimuths;
+    let azimuth = azimuths.max_by_key(|&azimuth| best(azimuth)).unwrap();
     let top = best(azimuth);
-    let bins: Vec<usize> = (FIRST_FREE_BIN..sampling().bins)
+    let bins: Vec<usize> = (FIRST_FREE_BIN..scan.geometry.bins)
         .filter(|&bin| scan.view().row(azimuth)[bin] == top)
         .collect();
     (
@@ -219,13 +220,11 @@ fn a_radar_of_its_own_measures_a_point_where_it_is() {
     );
     let geometry = scan.geometry;
     assert_eq!((geometry.azimuths, geometry.bins), (720, 300));
-    let brightest = |azimuth: usize| scan.view().row(azimuth).iter().copied().max();
-    let azimuth = (0..720).max_by_key(|azimuth| brightest(*azimuth)).unwrap();
+    let (azimuth, bin, top) = brightest(&scan);
     assert!(azimuth.abs_diff(180) <= 1, "{azimuth}");
-    let row = scan.view().row(180).to_vec();
-    let bin = (0..300).max_by_key(|bin| row[*bin]).unwrap();
-    assert!(bin.abs_diff(120) <= 1, "{bin}");
-    let wide = row.iter().filter(|power| **power > row[bin] - 6).count();
+    assert!((bin - 120.0).abs() <= 1.0, "{bin}");
+    let row = scan.view().row(azimuth).to_vec();
+    let wide = row.iter().filter(|power| **power > top - 6).count();
     assert!(wide <= 3, "{wide} bins within 3 dB");
 }
 

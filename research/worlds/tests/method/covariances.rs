@@ -80,7 +80,7 @@ fn motions() -> Vec<([bool; 2], UncertainMotion, Pose)> {
             if index >= FIRST {
                 let at = |index| drive.simulator().pose(index);
                 let lost = [index - 1, index].map(|index| !drive.lost_azimuths(index).is_empty());
-                let stated = ComposedMotion::of(&registered.motion).motion();
+                let stated = ComposedMotion::of(&registered.motion).motion;
                 motions.push((lost, stated, at(index - 1).inv_mul(&at(index))));
             }
         }

@@ -173,7 +173,7 @@ fn through(motions: &[(OdometryMotion, Pose, Pose, InitialGuess)]) -> Through {
             None => ComposedMotion::of(motion),
             Some(composed) => composed.then(motion),
         };
-        let (found, truth) = (next.motion(), start.inv_mul(pose));
+        let (found, truth) = (next.motion, start.inv_mul(pose));
         let off = Vector3::from(xy_yaw(&found.motion)) - Vector3::from(xy_yaw(&truth));
         let inverse = found.covariance.try_inverse().unwrap();
         nees += (off.transpose() * inverse * off)[0] / (3.0 * motions.len() as f64);

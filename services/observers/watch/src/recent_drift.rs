@@ -46,7 +46,7 @@ impl RecentDrift {
     pub fn drift(&self) -> Option<Drift> {
         let first = ComposedMotion::of(self.motions.front()?);
         let rest = self.motions.iter().skip(1);
-        let composed = rest.fold(first, |all, next| all.then(next)).motion();
+        let composed = rest.fold(first, |all, next| all.then(next)).motion;
         let covariance = composed.covariance;
         let (xx, yy) = (covariance[(0, 0)], covariance[(1, 1)]);
         let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));

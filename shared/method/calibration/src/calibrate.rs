@@ -87,7 +87,7 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let mut proposed = solution.determined();
     // Facts that the drive does not determine stay as configured, and the others are estimated
     // beside them.
-    while !proposed.is_empty() && proposed.len() < solution.free.len() {
+    while !proposed.is_empty() && proposed.len() < solution.round.free.len() {
         solution = Solution::find(drive, &before, &revisits, &proposed)?;
         for &fact in &proposed {
             facts[fact as usize] = solution.facts[fact as usize];
@@ -119,7 +119,6 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
 
 /// The facts that fit best while the others stay as configured.
 struct Solution {
-    free: Vec<Fact>,
     facts: [FactEstimate; FACTS],
     round: Round,
 }
@@ -145,7 +144,6 @@ impl Solution {
             false => None,
         };
         Ok(Self {
-            free: free.to_vec(),
             facts: facts(drive, &found, &at.change, by_drift),
             round: found,
         })
@@ -155,7 +153,7 @@ impl Solution {
     fn determined(&self) -> Vec<Fact> {
         let is_useful = |fact: &&Fact| self.facts[**fact as usize].is_useful();
         match self.round.has_converged() {
-            true => self.free.iter().filter(is_useful).copied().collect(),
+            true => self.round.free.iter().filter(is_useful).copied().collect(),
             false => Vec::new(),
         }
     }

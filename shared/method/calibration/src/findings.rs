@@ -4,7 +4,7 @@ mod constant;
 #[cfg(test)]
 mod tests;
 
-use std::{fmt, iter};
+use std::fmt;
 
 use gyre_geometry::SweepGeometry;
 
@@ -87,11 +87,11 @@ impl Found {
 
     /// Returns the means over several drives, each weighted by its uncertainty, with their overlap
     /// yet to be compared. Each drive keeps the rest in its own findings.
-    pub(crate) fn mean(first: &Self, others: &[&Self]) -> Self {
-        let drives = || iter::once(&first).chain(others);
-        let constants = (0..first.constants.len()).map(|k| {
-            let others: Vec<_> = others.iter().map(|it| &it.constants[k]).collect();
-            first.constants[k].mean(&others)
+    pub(crate) fn mean(all: &[&Self]) -> Self {
+        let drives = || all.iter();
+        let constants = (0..all[0].constants.len()).map(|k| {
+            let of_drives: Vec<_> = drives().map(|it| &it.constants[k]).collect();
+            Constant::mean(&of_drives)
         });
         Self {
             scans: drives().map(|it| it.scans).sum(),

@@ -1,7 +1,5 @@
 //! A drive with its findings, and several drives of one radar together.
 
-use std::iter;
-
 use crate::{Calibration, CalibrationError, Configured, Drive, Found, calibrate};
 
 pub struct Study {
@@ -21,15 +19,15 @@ impl Study {
         })
     }
 
-    /// Combines the findings of this drive and of others of one radar, each with its own
-    /// uncertainty. It is proposed if their scans overlap more with it, all together.
-    pub fn combined(&self, others: &[Self]) -> Result<Found, CalibrationError> {
-        let of_others: Vec<_> = others.iter().map(|it| &it.found).collect();
-        let mean = Found::mean(&self.found, &of_others);
+    /// Combines the findings of several drives of one radar, each with its own uncertainty. It is
+    /// proposed if their scans overlap more with it, all together.
+    pub fn combined(studies: &[Self]) -> Result<Found, CalibrationError> {
+        let found: Vec<_> = studies.iter().map(|it| &it.found).collect();
+        let mean = Found::mean(&found);
         let (change, mut overlap) = (mean.change(), [0.0; 2]);
         for Self {
             drive, calibration, ..
-        } in iter::once(self).chain(others)
+        } in studies
         {
             let share = drive.sweeps.len() as f64 / mean.scans as f64;
             let of_drive = calibration.overlap_with(drive, &change)?;

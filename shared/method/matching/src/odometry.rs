@@ -79,7 +79,7 @@ impl Odometry {
             finder: LostAzimuthFinder::default(),
             lost: LostAzimuths::default(),
             rows: PlacedRows::default(),
-            driven: ComposedMotion::new(),
+            driven: ComposedMotion::default(),
         }
     }
 
@@ -174,7 +174,7 @@ impl Odometry {
         Registered {
             seq: self.pair.seq(),
             motion,
-            pose: self.driven.motion(),
+            pose: self.driven.motion,
             outcome,
             interval_ns: self.pair.interval_ns(),
             searched,

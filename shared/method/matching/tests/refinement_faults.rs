@@ -83,10 +83,10 @@ fn the_covariance_of_a_pose_recovers_after_a_prediction() {
     scans[30] = noise(1);
     let run = refine(&drive, &scans);
     assert_eq!(run.refined[29].outcome, Outcome::Predicted);
-    let mut composed = ComposedMotion::new();
+    let mut composed = ComposedMotion::default();
     let variances_m2 = run.refined.iter().map(|refined| {
         composed = composed.then(&refined.motion);
-        composed.motion().covariance[(0, 0)]
+        composed.motion.covariance[(0, 0)]
     });
     let variances_m2: Vec<f64> = variances_m2.collect();
     let of_prediction = run.refined[29].motion.covariance[(0, 0)];

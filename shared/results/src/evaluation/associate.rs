@@ -44,28 +44,29 @@ pub fn associate(
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     require_poses(ESTIMATE, &estimate.poses)?;
     require_poses(TRUTH, &truth.poses)?;
-    match estimate.stamps().is_empty() || truth.stamps().is_empty() {
+    let (matched, coverage) = match estimate.stamps().is_empty() || truth.stamps().is_empty() {
         true => by_index(&estimate.poses, &truth.poses),
-        false => by_time(estimate, truth),
+        false => by_time(estimate, truth)?,
+    };
+    match matched.len() {
+        count @ 0..2 => Err(EvaluationError(format!(
+            "{count} of {} estimated poses could be associated with the {} poses of the ground truth; at least 2 are needed",
+            estimate.poses.len(),
+            truth.poses.len()
+        ))),
+        _ => Ok((matched, coverage)),
     }
 }
 
-fn by_index(
-    estimate: &[Pose],
-    truth: &[Pose],
-) -> Result<(MatchedPoses, Coverage), EvaluationError> {
+fn by_index(estimate: &[Pose], truth: &[Pose]) -> (MatchedPoses, Coverage) {
     let matched = estimate.len().min(truth.len());
-    if matched < 2 {
-        let given = [estimate.len(), truth.len()];
-        return Err(EvaluationError::too_few(matched, given));
-    }
     let coverage = Coverage::Index {
         matched,
         estimate_surplus: estimate.len() - matched,
         truth_surplus: truth.len() - matched,
     };
     let [estimate, truth] = [estimate, truth].map(|poses| poses[..matched].to_vec());
-    Ok((MatchedPoses::new(estimate, truth)?, coverage))
+    (MatchedPoses::new(estimate, truth), coverage)
 }
 
 fn by_time(
@@ -99,17 +100,13 @@ fn by_time(
             "the trajectories do not overlap in time: estimate {estimate}, ground truth {truth} (same clock, same unit?)"
         )));
     }
-    if matched < 2 {
-        let given = [estimate.poses.len(), truth.poses.len()];
-        return Err(EvaluationError::too_few(matched, given));
-    }
     let coverage = Coverage::Time {
         matched,
         outside_span,
         in_gaps,
         max_gap_ns,
     };
-    Ok((MatchedPoses::new(kept, true_poses)?, coverage))
+    Ok((MatchedPoses::new(kept, true_poses), coverage))
 }
 
 /// Refuses a wrong count of stamps, and stamps that decrease.
@@ -271,5 +268,28 @@ mod tests {
         let refused = associate(&short, &short).unwrap_err();
         assert!(refused.0.contains("estimate has 3 poses but 2 stamps"));
         assert!(associate(&empty, &empty).is_err());
+    }
+
+    #[test]
+    fn invalid_poses_are_refused_with_the_reason() {
+        let two = line(2);
+        let far = |x| vec![two[0], pose(x, 0.0, 0.0)];
+        let scaled = |length: f64| {
+            let rotation = nalgebra::Unit::new_unchecked(nalgebra::Complex::new(0.0, length));
+            vec![Pose::from_parts(Default::default(), rotation); 2]
+        };
+        let associated = |estimate: &[Pose], truth: &[Pose]| {
+            associate(&timed(&[], estimate), &timed(&[], truth))
+        };
+        assert!(associated(&scaled(1.0 + 1e-6), &two).is_ok());
+        for (estimate, truth, words) in [
+            (&two, &far(f64::NAN), "pose 1 of the ground truth"),
+            (&two, &far(f64::INFINITY), "1 of the ground truth"),
+            (&far(-2e9), &two, "pose 1 of the estimate"),
+            (&scaled(0.5), &two, "rotation of pose 0 of the estimate"),
+        ] {
+            let refused = associated(estimate, truth).unwrap_err().0;
+            assert!(refused.contains(words), "{refused}");
+        }
     }
 }

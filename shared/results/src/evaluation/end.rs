@@ -43,7 +43,7 @@ mod tests {
         let start = pose(-7.0, 2.0, 1.0);
         let [on_the_way, last] = [pose(99.0, 0.0, 2.0), pose(23.0, 4.0, 0.2)];
         let estimate = vec![start, start * on_the_way, start * last];
-        let end = end_error(&MatchedPoses::new(estimate, truth).unwrap());
+        let end = end_error(&MatchedPoses::new(estimate, truth));
         assert!((end.position_m - 5.0).abs() < 1e-9);
         assert!((end.heading_deg - 0.1f64.to_degrees()).abs() < 1e-9);
         assert!((end.percent.unwrap() - 25.0).abs() < 1e-9, "of 20 m");
@@ -51,9 +51,10 @@ mod tests {
 
     #[test]
     fn a_standing_ground_truth_has_no_relative_error() {
-        let end = end_error(
-            &MatchedPoses::new(vec![pose(0.0, 0.0, 0.0); 2], vec![pose(1.0, 1.0, 0.5); 2]).unwrap(),
-        );
+        let end = end_error(&MatchedPoses::new(
+            vec![pose(0.0, 0.0, 0.0); 2],
+            vec![pose(1.0, 1.0, 0.5); 2],
+        ));
         assert_eq!((end.position_m, end.percent), (0.0, None));
     }
 }

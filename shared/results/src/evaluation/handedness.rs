@@ -210,12 +210,12 @@ impl fmt::Display for Axes {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use gyre_geometry::pose;
 
     /// A drive with bends to both sides, more to the left.
-    fn drive() -> Vec<Pose> {
+    pub fn drive() -> Vec<Pose> {
         let mut here = pose(3.0, -2.0, 0.4);
         (0..300)
             .map(|k| {
@@ -227,7 +227,7 @@ mod tests {
     }
 
     fn resolve(estimate: Vec<Pose>, truth: Vec<Pose>) -> Axes {
-        resolve_axes(MatchedPoses::new(estimate, truth).unwrap()).1
+        resolve_axes(MatchedPoses::new(estimate, truth)).1
     }
 
     fn with(poses: Vec<Pose>, y: bool, heading: bool) -> Vec<Pose> {
@@ -244,7 +244,7 @@ mod tests {
                 ..Axes::default()
             };
             let changed = with(drive(), y, heading);
-            let matched = MatchedPoses::new(changed.clone(), drive()).unwrap();
+            let matched = MatchedPoses::new(changed.clone(), drive());
             let (resolved, found) = resolve_axes(matched);
             assert_eq!(resolved.estimate(), drive());
             assert_eq!(found, axes(HeadingFault::Estimate));

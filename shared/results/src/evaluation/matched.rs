@@ -2,13 +2,10 @@
 
 use gyre_geometry::Pose;
 
-use crate::evaluation::{
-    EvaluationError,
-    error::{ESTIMATE, LARGEST_COORDINATE_M, TRUTH},
-};
+use crate::evaluation::{EvaluationError, error::LARGEST_COORDINATE_M};
 
-/// Estimated and ground-truth poses, associated by index: valid, at least two, equally many. The
-/// fixed frames may differ.
+/// Estimated and ground-truth poses, associated by index: valid, at least two, equally many, as
+/// [`associate`](crate::evaluation::associate()) makes them. The fixed frames may differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedPoses {
     estimate: Vec<Pose>,
@@ -16,19 +13,8 @@ pub struct MatchedPoses {
 }
 
 impl MatchedPoses {
-    pub fn new(estimate: Vec<Pose>, truth: Vec<Pose>) -> Result<Self, EvaluationError> {
-        let (n, m) = (estimate.len(), truth.len());
-        if n != m {
-            return Err(EvaluationError(format!(
-                "{n} estimated poses cannot be compared one by one with {m} poses of the ground truth"
-            )));
-        }
-        if n < 2 {
-            return Err(EvaluationError::too_few(n, [n, m]));
-        }
-        require_poses(ESTIMATE, &estimate)?;
-        require_poses(TRUTH, &truth)?;
-        Ok(Self { estimate, truth })
+    pub fn new(estimate: Vec<Pose>, truth: Vec<Pose>) -> Self {
+        Self { estimate, truth }
     }
 
     pub fn estimate(&self) -> &[Pose] {
@@ -101,33 +87,4 @@ fn steps_m(poses: &[Pose]) -> impl Iterator<Item = f64> + '_ {
 
 pub fn path_m(poses: &[Pose]) -> f64 {
     steps_m(poses).sum()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use gyre_geometry::pose;
-
-    #[test]
-    fn unequal_short_and_invalid_lists_are_refused_with_the_reason() {
-        let still = Pose::identity();
-        let far = |x| vec![still, pose(x, 0.0, 0.0)];
-        let scaled = |length: f64| {
-            let rotation = nalgebra::Unit::new_unchecked(nalgebra::Complex::new(0.0, length));
-            vec![Pose::from_parts(Default::default(), rotation); 2]
-        };
-        let two = vec![still; 2];
-        assert!(MatchedPoses::new(scaled(1.0 + 1e-6), two.clone()).is_ok());
-        for (estimate, truth, words) in [
-            (vec![still; 3], two.clone(), "one by one with 2 poses"),
-            (vec![still], vec![still], "1 of 1 estimated"),
-            (two.clone(), far(f64::NAN), "pose 1 of the ground truth"),
-            (two.clone(), far(f64::INFINITY), "1 of the ground truth"),
-            (far(-2e9), two.clone(), "pose 1 of the estimate"),
-            (scaled(0.5), two, "rotation of pose 0 of the estimate"),
-        ] {
-            let refused = MatchedPoses::new(estimate, truth).unwrap_err().0;
-            assert!(refused.contains(words), "{refused}");
-        }
-    }
 }

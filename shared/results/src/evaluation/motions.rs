@@ -134,7 +134,7 @@ impl Chain {
                     Some(composed) => composed.then(motion),
                 };
                 *so_far = Some(next);
-                Some(next.motion())
+                Some(next.motion)
             })
     }
 

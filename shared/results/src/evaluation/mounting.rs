@@ -31,30 +31,21 @@ pub(crate) fn heading_offset_rad(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::ate::align;
-    use gyre_geometry::pose;
+    use crate::evaluation::{ate::align, handedness::tests::drive};
 
     #[test]
     fn a_sensor_that_is_mounted_otherwise_is_found() {
-        let drive = |mounting: f64| -> Vec<Pose> {
-            let mut here = pose(3.0, -2.0, 0.4);
-            let step = |k| {
-                here *= pose(1.0, 0.0, 0.03 * (0.04 * f64::from(k)).sin() + 0.004);
-                here * pose(0.0, 0.0, mounting)
-            };
-            (0..300).map(step).collect()
-        };
-        let found = |estimate, truth| {
-            let matched = MatchedPoses::new(estimate, truth).unwrap();
+        let found = |turned: &dyn Fn(usize) -> f64| {
+            let turn = |(k, p): (usize, Pose)| p * Pose::rotation(turned(k));
+            let estimate = drive().into_iter().enumerate().map(turn).collect();
+            let matched = MatchedPoses::new(estimate, drive());
             heading_offset_rad(&matched, &align(&matched))
         };
         for offset in [-1.5, 0.3, 3.1] {
-            let offset_rad = found(drive(offset), drive(0.0)).unwrap();
+            let offset_rad = found(&|_| offset).unwrap();
             assert!((offset_rad - offset).abs() < 1e-9, "{offset_rad}");
         }
-        assert_eq!(found(drive(0.05), drive(0.0)), None);
-        let turning = |k: usize, p: &Pose| *p * pose(0.0, 0.0, 0.02 * k as f64);
-        let turning = (0..).zip(&drive(0.0)).map(|(k, p)| turning(k, p)).collect();
-        assert_eq!(found(turning, drive(0.0)), None);
+        assert_eq!(found(&|_| 0.05), None);
+        assert_eq!(found(&|k| 0.02 * k as f64), None);
     }
 }

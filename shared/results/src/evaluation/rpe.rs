@@ -87,7 +87,7 @@ mod tests {
             };
             (0..11).map(step).collect::<Vec<_>>()
         };
-        let rpe = rpe(&MatchedPoses::new(chain(Some(4)), chain(None)).unwrap());
+        let rpe = rpe(&MatchedPoses::new(chain(Some(4)), chain(None)));
         let degrees = 0.1f64.to_degrees();
         assert_eq!(rpe.pairs.len(), 10);
         assert!((rpe.rotation_mean_deg - degrees / 10.0).abs() < 1e-9);
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn standing_still_has_no_forward_ratio() {
         let still = vec![Pose::identity(); 4];
-        let matched = MatchedPoses::new(still.clone(), still).unwrap();
+        let matched = MatchedPoses::new(still.clone(), still);
         assert_eq!(rpe(&matched).forward_ratio, None);
     }
 }

@@ -6,6 +6,8 @@ use gyre_configuration::terminal::Failure;
 use gyre_journal::objects::LoggedObjects;
 use gyre_slam::RecordReader;
 
+use crate::odometry;
+
 const HEADER: &str = "scan,stamp_ns,object,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,moving,age,\
     cov_xx,cov_xy,cov_yy,cov_vxvx,cov_vxvy,cov_vyvy\n";
 
@@ -19,12 +21,11 @@ pub fn csv(out: &Path) -> Result<String, Failure> {
         for it in &scan.objects {
             write!(rows, "{},{},{}", scan.scan, scan.stamp_ns, it.id)?;
             let place = [it.x_m, it.y_m, it.yaw_rad, it.vx_mps, it.vy_mps];
-            for value in place.into_iter().chain([it.length_m, it.width_m]) {
-                write!(rows, ",{value:.4}")?;
-            }
+            odometry::add(&mut rows, &place, 4);
+            odometry::add(&mut rows, &[it.length_m, it.width_m], 4);
             write!(rows, ",{},{}", it.moving, it.age)?;
-            for value in [it.position_covariance, it.velocity_covariance].concat() {
-                write!(rows, ",{value:.6}")?;
+            for covariance in [it.position_covariance, it.velocity_covariance] {
+                odometry::add(&mut rows, &covariance, 6);
             }
             rows.push('\n');
         }

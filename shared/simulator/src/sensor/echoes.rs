@@ -1,7 +1,6 @@
 //! The echoes of a sweep, with amplitudes by cross-section, aspect, occlusion and range.
 
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 use nalgebra::{Point2, Vector2};
 
@@ -46,7 +45,7 @@ pub(super) struct View<'a> {
 impl View<'_> {
     pub fn standing(&self, world: &World, echoes: &mut Vec<Echo>) {
         let centre = self.sweep_poses.middle().position;
-        for scatterer in world.around(centre, self.reach_m).flatten() {
+        for scatterer in world.around(centre, self.reach_m) {
             self.add_echoes(scatterer, Vector2::zeros(), echoes);
         }
     }
@@ -113,14 +112,9 @@ impl View<'_> {
     }
 }
 
-/// The echoes by the azimuths whose beams they reach.
+/// The numbers of the echoes by the azimuths whose beams they reach.
 #[derive(Clone, Debug, Default)]
-pub(super) struct BeamIndex {
-    spans: Vec<Range<usize>>,
-    /// The echoes of azimuth `a` are `numbers[starts[a]..starts[a + 1]]`.
-    starts: Vec<usize>,
-    numbers: Vec<u32>,
-}
+pub(super) struct BeamIndex(Vec<Vec<u32>>);
 
 impl BeamIndex {
     pub fn sort(&mut self, echoes: &[Echo], antenna: &Antenna, sweep_poses: &SweepPoses) {
@@ -135,33 +129,17 @@ impl BeamIndex {
             );
             (first.max(0.0) as usize)..((last + 1.0).clamp(0.0, azimuths as f64) as usize)
         };
-        self.spans.clear();
-        self.spans.extend(echoes.iter().map(span));
-        self.starts.clear();
-        self.starts.resize(azimuths + 1, 0);
-        self.spans
-            .iter()
-            .cloned()
-            .flatten()
-            .for_each(|azimuth| self.starts[azimuth] += 1);
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
-        self.numbers.clear();
-        self.numbers.resize(end, 0);
-        // Backwards, so that each azimuth's end moves down to its start.
-        for (number, span) in self.spans.iter().enumerate().rev() {
-            for azimuth in span.clone() {
-                self.starts[azimuth] -= 1;
-                self.numbers[self.starts[azimuth]] = number as u32;
+        self.0.resize_with(azimuths, Vec::new);
+        self.0.iter_mut().for_each(Vec::clear);
+        for (number, echo) in echoes.iter().enumerate() {
+            for azimuth in span(echo) {
+                self.0[azimuth].push(number as u32);
             }
         }
     }
 
     pub fn echoes(&self, azimuth: usize) -> &[u32] {
-        &self.numbers[self.starts[azimuth]..self.starts[azimuth + 1]]
+        &self.0[azimuth]
     }
 }
 

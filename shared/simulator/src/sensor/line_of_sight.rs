@@ -26,59 +26,22 @@ struct WallHit {
 /// The rays of a sweep, each from the pose of the sensor at its azimuth.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LineOfSight {
-    passed: Vec<WallHit>,
-    /// `starts[r]..starts[r + 1]` are the walls of ray `r`, nearest first.
-    starts: Vec<usize>,
+    /// The walls of each ray, nearest first.
+    rays: Vec<Vec<WallHit>>,
 }
 
 impl LineOfSight {
     pub fn cast(&mut self, scene: &Scene<'_>, sweep_poses: &SweepPoses, reach_m: f64) {
-        self.passed.clear();
-        self.starts.clear();
-        for ray in 0..(sweep_poses.azimuths + 2 * MARGIN) * RAYS {
-            let first = self.passed.len();
-            self.starts.push(first);
+        let count = (sweep_poses.azimuths + 2 * MARGIN) * RAYS;
+        self.rays.resize_with(count, Vec::new);
+        for (ray, passed) in self.rays.iter_mut().enumerate() {
             let azimuth = ray as f64 / RAYS as f64 - MARGIN as f64;
             let azimuth_pose = sweep_poses.at(azimuth.floor());
             let turned = azimuth.fract().rem_euclid(1.0) * sweep_poses.step_rad;
             let line = Rotation2::new(-turned) * azimuth_pose.beam * reach_m;
-            self.cast_ray(scene, azimuth_pose, line, reach_m);
-            self.passed[first..].sort_unstable_by(|a, b| a.range_m.total_cmp(&b.range_m));
-        }
-        self.starts.push(self.passed.len());
-    }
-
-    fn cast_ray(
-        &mut self,
-        scene: &Scene<'_>,
-        azimuth_pose: &AzimuthPose,
-        line: Vector2<f64>,
-        reach_m: f64,
-    ) {
-        let passed = &mut self.passed;
-        let mut add = |wall: &Wall, share: f64| {
-            passed.push(WallHit {
-                range_m: (share * reach_m) as f32,
-                transmission: wall.transmission as f32,
-                body: wall.body,
-            });
-        };
-        let from = azimuth_pose.position;
-        scene.world.walls.between(from, from + line, &mut add);
-        for mover in scene.movers {
-            let pose = mover.pose_after(azimuth_pose.time_s);
-            let from = pose.inverse_transform_point(&azimuth_pose.position);
-            let line = pose.inverse_transform_vector(&line);
-            // A ray that misses the circle around a body crosses none of its walls.
-            let (aside, ahead) = (line.perp(&from.coords).abs(), -line.dot(&from.coords));
-            if aside > MOVER_M * reach_m || ahead < -MOVER_M * reach_m {
-                continue;
-            }
-            for wall in &mover.body.walls {
-                if let Some(share) = crossing(from, line, wall) {
-                    add(wall, share);
-                }
-            }
+            passed.clear();
+            cast_ray(passed, scene, azimuth_pose, line, reach_m);
+            passed.sort_unstable_by(|a, b| a.range_m.total_cmp(&b.range_m));
         }
     }
 
@@ -97,7 +60,39 @@ impl LineOfSight {
     fn ray(&self, azimuth: f64) -> &[WallHit] {
         // The cast turns negative numbers into zero.
         let ray = ((azimuth + MARGIN as f64) * RAYS as f64 + 0.5) as usize;
-        let ray = ray.min(self.starts.len() - 2);
-        &self.passed[self.starts[ray]..self.starts[ray + 1]]
+        &self.rays[ray.min(self.rays.len() - 1)]
+    }
+}
+
+fn cast_ray(
+    passed: &mut Vec<WallHit>,
+    scene: &Scene<'_>,
+    azimuth_pose: &AzimuthPose,
+    line: Vector2<f64>,
+    reach_m: f64,
+) {
+    let mut add = |wall: &Wall, share: f64| {
+        passed.push(WallHit {
+            range_m: (share * reach_m) as f32,
+            transmission: wall.transmission as f32,
+            body: wall.body,
+        });
+    };
+    let from = azimuth_pose.position;
+    scene.world.walls.between(from, from + line, &mut add);
+    for mover in scene.movers {
+        let pose = mover.pose_after(azimuth_pose.time_s);
+        let from = pose.inverse_transform_point(&azimuth_pose.position);
+        let line = pose.inverse_transform_vector(&line);
+        // A ray that misses the circle around a body crosses none of its walls.
+        let (aside, ahead) = (line.perp(&from.coords).abs(), -line.dot(&from.coords));
+        if aside > MOVER_M * reach_m || ahead < -MOVER_M * reach_m {
+            continue;
+        }
+        for wall in &mover.body.walls {
+            if let Some(share) = crossing(from, line, wall) {
+                add(wall, share);
+            }
+        }
     }
 }

@@ -48,7 +48,11 @@ pub(super) fn missing(
         .map(|index| drive.image_name(index))
         .collect();
     let there = images(&folder)?;
-    let made_by_this = made_by_this(config, out)?;
+    let made_by_this = match made_with(out)? {
+        None => false,
+        Some(found) if same_scans(&found) == same_scans(config) => true,
+        Some(_) => return Err(other_dataset(out)),
+    };
     let ours: BTreeSet<&str> = names.iter().map(String::as_str).collect();
     if let Some(other) = there
         .iter()
@@ -78,16 +82,6 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
         }
     }
     Ok(names)
-}
-
-/// Returns whether `out` was made by `config`, except for the number of scans and their storage;
-/// false if that is unknown.
-fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
-    match made_with(out)? {
-        None => Ok(false),
-        Some(found) if same_scans(&found) == same_scans(config) => Ok(true),
-        Some(_) => Err(other_dataset(out)),
-    }
 }
 
 /// The configuration that made the dataset in `out`; `None` if that is unknown.

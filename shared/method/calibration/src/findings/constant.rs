@@ -1,4 +1,4 @@
-use std::{fmt, iter};
+use std::fmt;
 
 use super::Configured;
 use crate::{Calibration, CalibrationError, Estimate, FactEstimate};
@@ -36,17 +36,17 @@ impl Constant {
 
     /// Returns the mean over several drives of one radar. It is proposed if they determine it
     /// together, and none of them rejects its own estimate.
-    pub(super) fn mean(&self, others: &[&Self]) -> Self {
-        let drives = || iter::once(&self).chain(others);
-        let found = others
-            .iter()
-            .fold(self.found, |all, next| all.combined(&next.found));
+    pub(super) fn mean(all: &[&Self]) -> Self {
+        let drives = || all.iter();
+        let found = drives()
+            .skip(1)
+            .fold(all[0].found, |mean, next| mean.combined(&next.found));
         let basis = drives().map(|it| it.found.times(it.label.3).to_string());
         let mut mean = Self {
             found,
             has_settled: drives().all(|it| it.has_settled),
             basis: format!("of the drives {}", basis.collect::<Vec<_>>().join("; ")),
-            ..self.clone()
+            ..all[0].clone()
         };
         mean.is_proposed =
             mean.is_determined() && drives().all(|it| it.is_proposed || !it.is_determined());

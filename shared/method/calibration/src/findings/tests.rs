@@ -80,7 +80,7 @@ fn several_drives_tell_together_what_none_tells_alone() {
             .iter()
             .all(|drive| !drive.constants[0].is_determined())
     );
-    let both = Found::mean(&drives[0], &[&drives[1]]).compared([0.42, 0.43]);
+    let both = Found::mean(&[&drives[0], &drives[1]]).compared([0.42, 0.43]);
     assert_eq!(
         (both.scans, both.path_m, both.min_range_m),
         (200, 1000.0, Some(3.5))
@@ -97,9 +97,9 @@ fn several_drives_tell_together_what_none_tells_alone() {
     // An estimate that one drive rejects is rejected for all, as is an estimate that fits all
     // together less well.
     let rejecting = of(-0.5, 0.1, None);
-    let rejected = Found::mean(&rejecting, &[&drives[1]]);
+    let rejected = Found::mean(&[&rejecting, &drives[1]]);
     assert!(!rejected.constants[0].is_proposed);
     assert_eq!(rejected.change(), FactVector::zeros());
-    let less = Found::mean(&drives[0], &[&drives[1]]).compared([0.43, 0.42]);
+    let less = Found::mean(&[&drives[0], &drives[1]]).compared([0.43, 0.42]);
     assert!(!less.constants[0].is_proposed && less.overlap().contains("which is less"));
 }

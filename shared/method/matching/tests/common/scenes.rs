@@ -296,7 +296,7 @@ pub fn off(drive: &Drive, refined: &[Refined], over: std::ops::Range<usize>) -> 
         composed = composed.then(&refined.motion);
     }
     let truth = drive.pose(over.start).inv_mul(&drive.pose(over.end));
-    let motion = composed.motion();
+    let motion = composed.motion;
     (
         truth.inv_mul(&motion.motion),
         motion.covariance[(0, 0)].sqrt(),

@@ -47,7 +47,7 @@ fn motions() -> Vec<Motion> {
             }
             let [from, to] = [index - 1, index].map(|index| drive.simulator().pose(index));
             let lost = [index - 1, index].map(|index| !drive.lost_azimuths(index).is_empty());
-            let stated = ComposedMotion::of(&registered.motion).motion();
+            let stated = ComposedMotion::of(&registered.motion).motion;
             let truth = Vector3::from(xy_yaw(&from.inv_mul(&to)));
             let error = Vector3::from(xy_yaw(&stated.motion)) - truth;
             let squared = error.dot(&stated.covariance.cholesky().unwrap().solve(&error));
