@@ -15,7 +15,7 @@ use gyre_transport::run;
 
 use crate::{
     StagePlan, SuperviseError, Swapped, child::Child, processes::Processes, program::Program,
-    run::Run, socket::Client, start::Position,
+    run::Run, socket::Client,
 };
 use trial::Trial;
 
@@ -69,7 +69,7 @@ impl Swaps {
     ) -> Result<(), SuperviseError> {
         let manifest = run.manifest();
         let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
-        match Child::spawn(plan, &run.starter(), Position::Taken) {
+        match Child::spawn(plan, &run.starter(), true) {
             Ok(child) => {
                 self.standby = Some(Standby {
                     process,
