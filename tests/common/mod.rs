@@ -52,6 +52,9 @@ pub const STAGES: [&str; 6] = [
     "pose-integration",
 ];
 
+/// Those between source and sink.
+pub const BETWEEN: &[&str] = STAGES.split_at(STAGES.len() - 1).0.split_at(1).1;
+
 /// Small rasters: the tests are about processes.
 const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
 

@@ -7,7 +7,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::{
-    common::{Ended, Pid, Run, Running, Spawned, gyre, processes, send, undisturbed},
+    common::{BETWEEN, Ended, Pid, Run, Running, Spawned, gyre, processes, send, undisturbed},
     input::breaks,
     method::learned_masks::{TWO_SCANS, card},
     operate::commands::{ask, up},
@@ -19,12 +19,6 @@ const SCANS: usize = 160;
 const RATE: &str = "16";
 /// Where shadows are to keep up on a busy machine.
 const HALF_RATE: &str = "8";
-const STAGES: [&str; 4] = [
-    "masking",
-    "rotation-search",
-    "translation-search",
-    "refinement",
-];
 
 /// A run of the small recording, again and again.
 fn long() -> Run {
@@ -231,7 +225,9 @@ fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
     let run = Run::small().data(&breaks::with_a_gap()).rate("0.5");
     let run = run.masked_by(&card(TWO_SCANS));
     let running = held(&run);
-    let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &["--json"]));
+    let shadows = BETWEEN.iter();
+    let shadows = shadows.map(|stage| Shadow::start(&run, stage, stage, &["--json"]));
+    let shadows: Vec<_> = shadows.collect();
     shadows.iter().for_each(Shadow::await_attached);
     release(&running);
     running.finish().succeeded();

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::{
     PROGRAM,
-    common::{Ended, Run, STAGES, gyre, install, undisturbed},
+    common::{BETWEEN, Ended, Run, STAGES, gyre, install, undisturbed},
     operate::commands::{ask, process, started, status},
     reach::conformance,
 };
@@ -213,7 +213,7 @@ fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
         .set("run.mode=live")
         .set("source.scans=16");
     let running = run.started(4);
-    for &stage in &STAGES[1..5] {
+    for &stage in BETWEEN {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
     }
     running.finish().succeeded();

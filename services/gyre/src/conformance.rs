@@ -9,7 +9,6 @@ use gyre_configuration::{
     with_stored_options,
 };
 use gyre_contract::{StageId, run::Scheduling};
-use gyre_matching::{RefinementKind, odometry::SearchKind};
 use gyre_tools::conformance::{Candidate, Demands, Report, Test, check};
 use gyre_transport::{RunError, wake::Signals};
 
@@ -166,17 +165,9 @@ fn configuration(
     })?;
     let mut configuration = with_stored_options(&resolved)?.streaming(None);
     configuration.source.scans = Some(arguments.scans.into());
-    let method = &mut configuration.odometry;
-    match stage {
-        StageId::JointSearch => method.search.kind = SearchKind::Exhaustive,
-        StageId::RotationSearch | StageId::TranslationSearch => {
-            method.search.kind = SearchKind::Decoupled;
-        }
-        StageId::Refinement => method.refinement.kind = RefinementKind::LocalMap,
-        StageId::RadarReplay | StageId::Masking | StageId::PoseIntegration => {}
-    }
+    configuration.choose(stage);
     // Some scans must be under way while the motion of the oldest is not known.
-    let least = method.masking.feedback_lag() + 2;
+    let least = configuration.odometry.masking.feedback_lag() + 2;
     configuration.run.window = configuration.run.window.max(least);
     configuration.run.observers = configuration.run.observers.max(OBSERVERS);
     Ok(configuration)

@@ -12,7 +12,7 @@ use gyre_contract::{
 };
 use gyre_results::{Content, Out};
 use gyre_tools::{
-    conformance::shadow::{self, Options, STAGES},
+    conformance::shadow::{self, Options},
     operate::{RunChoice, chosen},
 };
 
@@ -85,9 +85,10 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
 }
 
 fn stage(name: &str) -> Result<StageId, Failure> {
-    let stages = STAGES.map(StageId::name).join(", ");
+    let stages: Vec<&str> = StageId::between().map(StageId::name).collect();
+    let stages = stages.join(", ");
     let stage = StageId::by_name(name);
-    if let Some(stage) = stage.filter(|stage| STAGES.contains(stage)) {
+    if let Some(stage) = StageId::between().find(|it| Some(*it) == stage) {
         return Ok(stage);
     }
     let reason = match stage {

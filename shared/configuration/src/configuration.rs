@@ -12,7 +12,7 @@ use std::{
 };
 
 use gyre_contract::{
-    FollowerId, StageId, Window,
+    FollowerId, StageId, StageTopics, Window,
     run::{
         Budget, LinkConfig, Mode, PlayedFrom, RecordConfig, RunConfig, Scenario, Side,
         SourceConfig, SourceKind, StageConfig,
@@ -287,16 +287,24 @@ impl Configuration {
         }
     }
 
+    /// Chooses the search or the refinement that consists of this stage, so that the run has it.
+    pub fn choose(&mut self, stage: StageId) {
+        let method = &mut self.odometry;
+        match stage {
+            StageId::JointSearch => method.search.kind = SearchKind::Exhaustive,
+            StageId::RotationSearch | StageId::TranslationSearch => {
+                method.search.kind = SearchKind::Decoupled;
+            }
+            StageId::Refinement => method.refinement.kind = RefinementKind::LocalMap,
+            StageId::RadarReplay | StageId::Masking | StageId::PoseIntegration => {}
+        }
+    }
+
     /// Returns whether the run starts this stage: it has it, and neither a recording nor the other
     /// side of a link takes its place.
     pub fn starts(&self, stage: StageId) -> bool {
-        let computes = match stage {
-            StageId::RadarReplay | StageId::PoseIntegration => None,
-            StageId::Masking => Some(PlayedFrom::Masked),
-            StageId::RotationSearch => Some(PlayedFrom::Rotation),
-            StageId::TranslationSearch | StageId::JointSearch => Some(PlayedFrom::Motion),
-            StageId::Refinement => Some(PlayedFrom::Refined),
-        };
+        let topics = StageTopics::of(stage, &self.window(None, 1), self.has(StageId::Refinement));
+        let computes = PlayedFrom::by_name(topics.output).filter(|it| *it != PlayedFrom::Scan);
         // The topics are in the order of the stream.
         let is_here = |topic: PlayedFrom| match self.link.side {
             Some(Side::Robot) => topic as u8 <= self.link.cut as u8,

@@ -234,12 +234,18 @@ mod tests {
     const MODEL: &str = "[masking]\nmodel = 'models/gyre-255.toml'\n";
 
     #[test]
-    fn a_path_is_one_beside_the_configuration_whatever_the_current_folder_has() {
-        let both = ["robot/models/gyre-255.toml", "here/models/gyre-255.toml"];
-        let (folder, named) = read(&both, MODEL);
-        let beside = folder.path().join("robot/models/gyre-255.toml");
-        assert_eq!(at(&named, "masking.model"), beside);
-        assert!(named.notes(&named.table).is_empty());
+    fn a_path_is_one_beside_the_configuration_also_of_what_is_nowhere_or_to_be_written() {
+        let models = ["robot/models/gyre-255.toml", "here/models/gyre-255.toml"];
+        let (map, recording) = ("[slam]\nmap = 'a.map'\n", "[record]\nfile = 'a.mcap'\n");
+        for (files, text, key, beside) in [
+            (&models[..], MODEL, "masking.model", models[0]),
+            (&[], map, "slam.map", "robot/a.map"),
+            (&["here/a.mcap"], recording, "record.file", "robot/a.mcap"),
+        ] {
+            let (folder, named) = read(files, text);
+            assert_eq!(at(&named, key), folder.path().join(beside));
+            assert!(named.notes(&named.table).is_empty(), "{key}");
+        }
     }
 
     #[test]
@@ -264,21 +270,6 @@ mod tests {
         let mut changed = named.table.clone();
         strict::set(&mut changed, "source.data=/other").unwrap();
         assert!(named.notes(&changed).is_empty());
-    }
-
-    #[test]
-    fn what_is_nowhere_is_beside_the_configuration() {
-        let (folder, named) = read(&[], "[slam]\nmap = 'town.map'\n");
-        assert_eq!(at(&named, "slam.map"), folder.path().join("robot/town.map"));
-    }
-
-    #[test]
-    fn a_recording_is_written_beside_the_configuration() {
-        let (folder, named) = read(&["here/a.mcap"], "[record]\nfile = 'a.mcap'\n");
-        assert_eq!(
-            at(&named, "record.file"),
-            folder.path().join("robot/a.mcap")
-        );
     }
 
     #[test]

@@ -16,6 +16,14 @@ pub struct StageTopics {
     pub output: &'static str,
 }
 
+impl StageId {
+    /// Returns the stages between source and sink, which are functions of their inputs.
+    pub fn between() -> impl Iterator<Item = Self> {
+        let is_end = |it: &Self| matches!(it, Self::RadarReplay | Self::PoseIntegration);
+        Self::ALL.into_iter().filter(move |it| !is_end(it))
+    }
+}
+
 /// Returns the topic whose motions are composed to poses, in a run with refinement or without.
 pub fn composed(refines: bool) -> &'static Topic {
     match refines {

@@ -44,15 +44,6 @@ pub struct Options {
     pub report: Option<PathBuf>,
 }
 
-/// The stages that can have a shadow: those between source and sink.
-pub const STAGES: [StageId; 5] = [
-    StageId::Masking,
-    StageId::RotationSearch,
-    StageId::TranslationSearch,
-    StageId::JointSearch,
-    StageId::Refinement,
-];
-
 /// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal
 /// requests a stop. `observe` receives lines about the progress. Faults of the program are in the
 /// report, not in the error.

@@ -1,7 +1,6 @@
-use std::{fs, thread, time::Duration};
+use std::{thread, time::Duration};
 
 use gyre_contract::Item;
-use gyre_storage::GroupSync;
 use tempfile::TempDir;
 
 use super::*;
@@ -86,61 +85,4 @@ fn the_end_of_the_stream_is_no_pose_and_what_follows_it_is_cut_off() {
     let mut journal = Journal::open(folder.path()).unwrap();
     let (last, ended) = journal.last(9).unwrap();
     assert_eq!((seqs(&last), ended), (vec![0, 1, 2], true));
-}
-
-#[test]
-fn what_a_death_leaves_of_the_last_record_is_cut_off() {
-    let folder = journal_of(2);
-    let path = path(folder.path());
-    let complete = fs::read(&path).unwrap();
-    for length in (0..complete.len()).step_by(11) {
-        fs::write(&path, &complete[..length]).unwrap();
-        let expected = (length.saturating_sub(16) / (complete.len() / 2 - 8)) as u64;
-        assert_eq!(
-            check(folder.path()).unwrap().poses,
-            expected,
-            "{length} bytes"
-        );
-        let mut journal = Journal::open(folder.path()).unwrap();
-        journal.append(&pose(expected)).unwrap();
-        assert_eq!(read(&folder).len() as u64, expected + 1, "{length} bytes");
-    }
-}
-
-#[test]
-fn a_pose_that_was_safe_and_is_not_whole_is_reported_and_left_as_it_is() {
-    let folder = journal_of(3 * GroupSync::LIMIT);
-    let path = path(folder.path());
-    let whole = fs::read(&path).unwrap();
-    for damaged in [0, 1, GroupSync::LIMIT as usize] {
-        let mut corrupted = whole.clone();
-        corrupted[16 + damaged * (whole.len() / 96) + 100] ^= 1;
-        fs::write(&path, &corrupted).unwrap();
-        let error = check(folder.path()).unwrap_err().to_string();
-        let expected = format!("poses.journal is damaged at record {damaged},");
-        assert!(error.contains(&expected), "{error}");
-        assert_eq!(fs::read(&path).unwrap(), corrupted);
-    }
-}
-
-#[test]
-fn the_files_of_other_programs_and_versions_are_refused_and_left_as_they_are() {
-    let folder = journal_of(2);
-    let path = path(folder.path());
-    let own = fs::read(&path).unwrap();
-    let earlier = [&b"gyre journal v12"[..], &own[16..]].concat();
-    for (theirs, expected) in [
-        (&b"something else altogether"[..], "is not a file of Gyre"),
-        (&earlier[..], "of another version"),
-    ] {
-        fs::write(&path, theirs).unwrap();
-        for error in [
-            check(folder.path()).err(),
-            Journal::open(folder.path()).err(),
-        ] {
-            let error = error.unwrap().to_string();
-            assert!(error.contains(expected), "{error}");
-        }
-        assert_eq!(fs::read(&path).unwrap(), theirs);
-    }
 }

@@ -19,13 +19,7 @@ use gyre_transport::{
 };
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use crate::{
-    StagePlan, SuperviseError,
-    end::ends_within,
-    log::Log,
-    run::Run,
-    start::{Position, Starter},
-};
+use crate::{StagePlan, SuperviseError, end::ends_within, log::Log, run::Run, start::Starter};
 
 /// The time in which restarts are counted against the limit of a stage.
 const RESTART_WINDOW: Duration = Duration::from_secs(30);
@@ -57,10 +51,10 @@ impl Child {
     pub fn spawn(
         plan: &StagePlan,
         starter: &Starter<'_>,
-        position: Position,
+        stands_by: bool,
     ) -> Result<Self, SuperviseError> {
         let log = Log::open(starter.manifest, &plan.name)?;
-        let process = starter.start(plan, log.output(), position)?;
+        let process = starter.start(plan, log.output(), stands_by)?;
         Ok(Self {
             plan: plan.clone(),
             process,
@@ -89,7 +83,7 @@ impl Child {
                 path.display()
             )));
         }
-        self.process = starter.start(&self.plan, self.log.output(), Position::Free)?;
+        self.process = starter.start(&self.plan, self.log.output(), false)?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);

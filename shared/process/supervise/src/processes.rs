@@ -11,7 +11,7 @@ use gyre_transport::wake;
 
 use crate::{
     END_TIMEOUT, Ending, Event, Plan, SuperviseError, child::Child, followers::Followers,
-    guardian::Guardian, recovery::Recovery, run::Run, start::Position,
+    guardian::Guardian, recovery::Recovery, run::Run,
 };
 
 #[derive(Default)]
@@ -38,7 +38,7 @@ impl Processes {
     pub fn start(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
         let plan = run.plan;
         for stage in &plan.stages {
-            let child = Child::spawn(stage, &run.starter(), Position::Free)?;
+            let child = Child::spawn(stage, &run.starter(), false)?;
             run.note(&format!("{:20} pid {}", stage.name, child.pid()));
             self.children.push(child);
         }

@@ -11,7 +11,6 @@ use crate::{
     Ending, Event, SuperviseError,
     child::{Child, RESTART_BACKOFF},
     run::Run,
-    start::Position,
 };
 
 /// The longest time for which the first scan waits until the recorder observes all topics.
@@ -37,7 +36,7 @@ impl Recorder {
         let Some(plan) = &run.plan.recorder else {
             return Ok(None);
         };
-        let mut child = match Child::spawn(plan, &run.starter(), Position::Free) {
+        let mut child = match Child::spawn(plan, &run.starter(), false) {
             Err(SuperviseError::Process(reason)) => {
                 run.note(&reason);
                 return Ok(None);

@@ -17,7 +17,7 @@ use crate::{
     child::Child,
     socket::{Client, ControlSocket},
     supervisor::Supervisor,
-    swaps::{Standby, Step, plan_of},
+    swaps::{Standby, plan_of},
 };
 
 /// Requests that are answered before the supervisor looks after its processes again.
@@ -165,9 +165,9 @@ impl Supervisor<'_> {
     pub(crate) fn continue_swap(&mut self) -> Result<(), SuperviseError> {
         let is_in_flight = || self.poses.are_owed(self.run.manifest());
         match self.swaps.step(&self.run, is_in_flight) {
-            Step::Wait => Ok(()),
-            Step::TakeOver(standby) => self.take_over(standby),
-            Step::GiveUp(standby, reason) => {
+            None => Ok(()),
+            Some((standby, Ok(()))) => self.take_over(standby),
+            Some((standby, Err(reason))) => {
                 self.give_up(standby, &reason);
                 Ok(())
             }

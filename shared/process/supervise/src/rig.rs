@@ -21,11 +21,8 @@ use gyre_transport::{
 };
 
 use crate::{
-    Death, Scheduling, StagePlan, SuperviseError,
-    child::Child,
-    clean,
-    guardian::Guardian,
-    start::{Position, Starter},
+    Death, Scheduling, StagePlan, SuperviseError, child::Child, clean, guardian::Guardian,
+    start::Starter,
 };
 
 pub use recorded::Recorded;
@@ -102,12 +99,8 @@ impl<'a> Rig<'a> {
             signals: self.signals,
             guardian: &self.guardian,
         };
-        let position = match stands_by {
-            true => Position::Taken,
-            false => Position::Free,
-        };
         Ok(Process {
-            child: Child::spawn(&plan, &starter, position)?,
+            child: Child::spawn(&plan, &starter, stands_by)?,
             death: None,
         })
     }

@@ -20,15 +20,6 @@ use crate::{
 /// for which it is tried.
 const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 
-/// The position in the pipeline of a process that is started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Position {
-    Free,
-    /// Another process has it: the new one stands by until its standard input ends (see
-    /// [`run::STANDBY`]).
-    Taken,
-}
-
 pub(crate) struct Starter<'a> {
     pub manifest: &'a Manifest,
     pub signals: &'a Signals,
@@ -36,11 +27,13 @@ pub(crate) struct Starter<'a> {
 }
 
 impl Starter<'_> {
+    /// One that `stands_by`, since another process has its place, does so until its standard input
+    /// ends (see [`run::STANDBY`]).
     pub fn start(
         &self,
         plan: &StagePlan,
         log: &PipeWriter,
-        position: Position,
+        stands_by: bool,
     ) -> Result<Child, SuperviseError> {
         let (stage, program) = (&plan.name, plan.command.join(" "));
         let failed = |source: io::Error| {
@@ -53,7 +46,7 @@ impl Starter<'_> {
         if let Some(directory) = &plan.directory {
             command.current_dir(directory);
         }
-        if position == Position::Taken {
+        if stands_by {
             command.env(run::STANDBY, "1").stdin(Stdio::piped());
         }
         let pause = |pause| self.signals.sleep(pause);

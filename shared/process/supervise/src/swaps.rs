@@ -15,7 +15,7 @@ use gyre_transport::run;
 
 use crate::{
     StagePlan, SuperviseError, Swapped, child::Child, processes::Processes, program::Program,
-    run::Run, socket::Client, start::Position,
+    run::Run, socket::Client,
 };
 use trial::Trial;
 
@@ -42,13 +42,6 @@ pub(crate) struct Standby {
     ready: Option<Instant>,
 }
 
-pub(crate) enum Step {
-    Wait,
-    TakeOver(Standby),
-    /// It cannot take over, and why.
-    GiveUp(Standby, String),
-}
-
 impl Swaps {
     pub fn why_not_now(&self, has_ended: bool) -> Option<&'static str> {
         match () {
@@ -69,7 +62,7 @@ impl Swaps {
     ) -> Result<(), SuperviseError> {
         let manifest = run.manifest();
         let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
-        match Child::spawn(plan, &run.starter(), Position::Taken) {
+        match Child::spawn(plan, &run.starter(), true) {
             Ok(child) => {
                 self.standby = Some(Standby {
                     process,
@@ -85,31 +78,26 @@ impl Swaps {
         Ok(())
     }
 
-    /// `is_in_flight` returns whether a scan lacks its pose.
-    pub fn step(&mut self, run: &Run<'_>, is_in_flight: impl FnOnce() -> bool) -> Step {
-        let Some(mut standby) = self.standby.take() else {
-            return Step::Wait;
-        };
-        if let Some(reason) = standby.why_not() {
-            return Step::GiveUp(standby, reason);
-        }
-        let name = standby.child.name();
-        let is_ready = run::ready_file(&run.manifest().root, name).exists();
+    /// Returns the program that is to take over now, or an error if it cannot; `None` as long as it
+    /// stands by. `is_in_flight` returns whether a scan lacks its pose.
+    pub fn step(
+        &mut self,
+        run: &Run<'_>,
+        is_in_flight: impl FnOnce() -> bool,
+    ) -> Option<(Standby, Result<(), String>)> {
+        let mut standby = self.standby.take()?;
+        let is_ready = run::ready_file(&run.manifest().root, standby.child.name()).exists();
         if is_ready && standby.ready.is_none() {
             standby.ready = Some(Instant::now());
         }
         let ready = standby.ready.map(|ready| ready.elapsed());
-        let limit = run.plan.start_timeout;
-        match judge(ready, standby.since.elapsed(), limit, is_in_flight) {
-            Judged::TooLate => Step::GiveUp(
-                standby,
-                "it did not get ready to take over (run.start_timeout_s); start a program that cannot stand by with --cold"
-                    .to_owned(),
-            ),
-            Judged::Now => Step::TakeOver(standby),
-            Judged::Later => {
+        let (stood_by, limit) = (standby.since.elapsed(), run.plan.start_timeout);
+        let refused = standby.why_not().map(Err);
+        match refused.or_else(|| judge(ready, stood_by, limit, is_in_flight)) {
+            Some(judged) => Some((standby, judged)),
+            None => {
                 self.standby = Some(standby);
-                Step::Wait
+                None
             }
         }
     }
@@ -149,24 +137,21 @@ impl Standby {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Judged {
-    Now,
-    Later,
-    TooLate,
-}
-
 /// Judges a program that has stood by for some time, and has been ready for some of it, if at all.
+/// `None`: later.
 fn judge(
     ready: Option<Duration>,
     stood_by: Duration,
     limit: Option<Duration>,
     is_in_flight: impl FnOnce() -> bool,
-) -> Judged {
+) -> Option<Result<(), String>> {
     match ready {
-        None if limit.is_some_and(|limit| stood_by > limit) => Judged::TooLate,
-        Some(ready) if !is_in_flight() || ready > PATIENCE => Judged::Now,
-        _ => Judged::Later,
+        None if limit.is_some_and(|limit| stood_by > limit) => Some(Err(
+            "it did not get ready to take over (run.start_timeout_s); start a program that cannot stand by with --cold"
+                .to_owned(),
+        )),
+        Some(ready) if !is_in_flight() || ready > PATIENCE => Some(Ok(())),
+        _ => None,
     }
 }
 
@@ -190,14 +175,15 @@ mod tests {
     fn a_program_takes_over_when_it_is_ready_and_is_not_waited_for_without_end() {
         let (moment, long) = (Duration::from_millis(1), 2 * PATIENCE);
         for (ready, limit, is_in_flight, expected) in [
-            (Some(moment), Some(moment), true, Judged::Later),
-            (Some(moment), Some(moment), false, Judged::Now),
-            (Some(long), Some(moment), true, Judged::Now),
-            (None, Some(moment), false, Judged::TooLate),
-            (None, Some(2 * long), false, Judged::Later),
-            (None, None, false, Judged::Later),
+            (Some(moment), Some(moment), true, None),
+            (Some(moment), Some(moment), false, Some(true)),
+            (Some(long), Some(moment), true, Some(true)),
+            (None, Some(moment), false, Some(false)),
+            (None, Some(2 * long), false, None),
+            (None, None, false, None),
         ] {
             let judged = judge(ready, long, limit, || is_in_flight);
+            let judged = judged.map(|judged| judged.is_ok());
             assert_eq!(judged, expected, "{ready:?}, {limit:?}, {is_in_flight}");
         }
     }

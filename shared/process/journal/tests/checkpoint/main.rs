@@ -60,11 +60,13 @@ fn scan(world: u64, item: u64) -> Vec<SparsePoint> {
         .collect()
 }
 
-/// Refines items and writes the state after each, as the stage does.
+/// Refines items and writes the state after each, as the stage does, with the motion of [`pose`] by
+/// a metre.
 fn process(refinement: &mut Refiner, checkpoint: &mut Checkpoint, items: std::ops::Range<u64>) {
     for item in items {
         step(refinement, 1, item);
-        checkpoint.write(item, 0, refinement).unwrap();
+        let motion = checkpoint::checksum(&pose(item, 1.0).motion);
+        checkpoint.write(item, motion, refinement).unwrap();
     }
 }
 
@@ -249,19 +251,6 @@ fn pose(item: u64, x_m: f64) -> PoseHeader {
     }
 }
 
-/// A checkpoint of a process of this many items whose motions are [`pose`] with one metre.
-fn checkpoint_of_poses(items: u64) -> (tempfile::TempDir, std::path::PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = checkpoint::path(folder.path());
-    let (mut refinement, mut checkpoint) = (refinement(), open(&path));
-    for item in 1..items {
-        step(&mut refinement, 1, item);
-        let motion = checkpoint::checksum(&pose(item, 1.0).motion);
-        checkpoint.write(item, motion, &refinement).unwrap();
-    }
-    (folder, path)
-}
-
 fn newest_known(path: &Path, poses: &[PoseHeader]) -> Option<u64> {
     let mut checkpoint = open(path);
     let newest = checkpoint.newest_known(poses.iter().rev()).unwrap();
@@ -270,7 +259,7 @@ fn newest_known(path: &Path, poses: &[PoseHeader]) -> Option<u64> {
 
 #[test]
 fn the_newest_pose_whose_whole_state_is_there_is_found() {
-    let (_folder, path) = checkpoint_of_poses(30);
+    let (_folder, path) = checkpoint_of(30);
     let poses: Vec<_> = (0..35).map(|item| pose(item, 1.0)).collect();
     assert_eq!(newest_known(&path, &poses[..20]), Some(19));
     assert_eq!(newest_known(&path, &poses), Some(29));
@@ -283,7 +272,7 @@ fn the_newest_pose_whose_whole_state_is_there_is_found() {
 #[test]
 fn a_state_that_lacks_a_keyframe_is_not_known_and_is_completed_when_its_item_is_repeated() {
     let history = history(31);
-    let (_folder, path) = checkpoint_of_poses(30);
+    let (_folder, path) = checkpoint_of(30);
     let mut bytes = fs::read(&path).unwrap();
     let end = bytes.len();
     // The slot of the newest keyframe is the last one that was added.
@@ -293,11 +282,7 @@ fn a_state_that_lacks_a_keyframe_is_not_known_and_is_completed_when_its_item_is_
     let known = newest_known(&path, &poses).unwrap();
     assert!((20..29).contains(&known), "{known}");
     let (mut refinement, mut checkpoint) = resumed(&path, known);
-    for item in known + 1..30 {
-        step(&mut refinement, 1, item);
-        let motion = checkpoint::checksum(&pose(item, 1.0).motion);
-        checkpoint.write(item, motion, &refinement).unwrap();
-    }
+    process(&mut refinement, &mut checkpoint, known + 1..30);
     drop(checkpoint);
     assert_eq!(newest_known(&path, &poses), Some(29));
     assert_eq!(restored(&path, 29).unwrap(), history[29]);
