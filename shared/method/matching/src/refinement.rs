@@ -189,7 +189,10 @@ impl Refiner {
         let gyro = self.aiding.turn.and(self.state.heading);
         let wheels = self.aiding.distance.and(self.state.wheels);
         let doppler = self.displacement.and(self.state.doppler);
-        let report = self.hold_standstill(&scan, &accepted);
+        let mut report = self.hold_standstill(&scan, &accepted);
+        if let (false, Some(heading)) = (report.stationary, &mut self.state.heading) {
+            report.motion.motion = heading.correct(&report.motion.motion);
+        }
         self.update(&scan, &best, &accepted);
         Refined {
             motion: OdometryMotion {
@@ -214,6 +217,7 @@ impl Refiner {
     pub fn reset(&mut self) {
         self.map.clear();
         self.state.leave_map();
+        self.state.heading.iter_mut().for_each(Heading::start_chain);
         self.state = TrackerState {
             heading: self.state.heading,
             wheels: self.state.wheels,
@@ -305,7 +309,7 @@ impl Refiner {
         }
         Accepted {
             outcome,
-            pose: self.with_gyro_heading(scan, registered),
+            pose: self.update_heading(scan, registered),
             guess: best.guess,
             ahead_m: found.ahead_m,
             leaves_map: found.leaves_map,
@@ -327,8 +331,11 @@ impl Refiner {
     fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> Accepted {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction;
-        if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
-            heading.inflate(covariance[(2, 2)]);
+        if let Some(heading) = &mut self.state.heading {
+            match scan.step.turn {
+                Some(_) => heading.take_prediction(),
+                None => heading.inflate(covariance[(2, 2)]),
+            }
         }
         let alone = UncertainMotion {
             motion: self.state.pose.inv_mul(&motion),
@@ -418,9 +425,6 @@ impl Refiner {
             self.state.leave_map();
         } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, ahead_m) {
             self.insert_keyframe(scan.id, scan.points, pose, &twist);
-            if let Some(heading) = &mut self.state.heading {
-                heading.add_keyframe(self.map.len());
-            }
         }
     }
 

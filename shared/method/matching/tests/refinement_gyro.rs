@@ -92,14 +92,32 @@ fn a_gyro_that_was_refused_last_does_not_turn_a_blind_vehicle() {
     assert_eq!(judged(&refined, Verdict::Refused), all);
 }
 
-/// A match can err by two degrees as well as the gyro: which of them does is not known.
+/// A gyro that is wrong once by two degrees, and a scan that is turned by two degrees as a whole:
+/// which of both errs shows the next match.
 #[test]
-fn a_gyro_that_differs_by_what_a_match_can_err_is_doubted_and_weighed() {
-    let (drive, scans) = bend();
-    let wrong = |k: usize| if k == WRONG.start { 0.15 } else { 0.0 };
-    let refined = refine_with(&GyroConfig::default(), (&drive, &scans), wrong);
-    assert!(judged(&refined, Verdict::Doubted).contains(&WRONG.start));
-    assert_eq!(judged(&refined, Verdict::Refused), [0; 0]);
+fn a_single_error_of_the_gyro_or_of_a_scan_is_doubted_and_the_next_match_decides() {
+    let (drive, mut scans) = bend();
+    let start = WRONG.start;
+    let error_rad = 0.15 * SWEEP_S;
+    let wrong_gyro = |k: usize| if k == start { 0.15 } else { 0.0 };
+    let by_gyro = refine_with(&GyroConfig::default(), (&drive, &scans), wrong_gyro);
+    let (sin, cos) = (error_rad as f32).sin_cos();
+    for point in &mut scans[start] {
+        let [x, y] = [point.x_m, point.y_m];
+        (point.x_m, point.y_m) = (cos * x - sin * y, sin * x + cos * y);
+    }
+    let by_scan = refine_with(&GyroConfig::default(), (&drive, &scans), |_| 0.0);
+    for (refined, refused) in [(&by_gyro, vec![start + 1]), (&by_scan, vec![])] {
+        assert_eq!(judged(refined, Verdict::Doubted), [start]);
+        assert_eq!(judged(refined, Verdict::Refused), refused);
+        let sigma_rad = refined[start - 1].motion.covariance[(2, 2)].sqrt();
+        assert!(sigma_rad > 0.8 * error_rad, "{sigma_rad} rad");
+        let (displacement, _) = off(&drive, refined, 0..SCANS - 1);
+        assert!(displacement.rotation.angle().abs() < 4e-3, "{displacement}");
+    }
+    let turn_rad = by_scan[start - 1].motion.motion.rotation.angle();
+    let off_rad = turn_rad - drive.yaw_rate_radps * SWEEP_S;
+    assert!(off_rad.abs() < 0.1 * error_rad, "{off_rad} rad");
 }
 
 #[test]

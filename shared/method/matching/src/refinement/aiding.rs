@@ -111,9 +111,16 @@ impl Refiner {
             true => self.gate(&best, &turn),
             false => Verdict::Agrees,
         };
-        let refusal = match best.is_plausible && verdict != Verdict::Refused {
+        // The match after a wrong match takes the error back.
+        let doubted = self.state.heading.map(|heading| heading.verdict) == Some(Verdict::Doubted);
+        let is_against = |verdict| match verdict {
+            Verdict::Agrees => false,
+            Verdict::Doubted => doubted,
+            Verdict::Refused => true,
+        };
+        let refusal = match best.is_plausible && !is_against(verdict) {
             true => None,
-            false => self.match_against_gyro(&alone, &turn),
+            false => self.match_against_gyro(&alone, &turn, is_against),
         };
         if let Some(heading) = &mut self.state.heading {
             heading.verdict = match (refusal.is_some(), verdict) {
@@ -130,11 +137,16 @@ impl Refiner {
 
     /// Returns the best match of a scan without the turn of the gyro, if it is certain that it
     /// contradicts that. Otherwise the deskewed points stay with the match before.
-    fn match_against_gyro(&mut self, alone: &Scan<'_>, turn: &PredictedTurn) -> Option<Candidate> {
+    fn match_against_gyro(
+        &mut self,
+        alone: &Scan<'_>,
+        turn: &PredictedTurn,
+        is_against: impl Fn(Verdict) -> bool,
+    ) -> Option<Candidate> {
         std::mem::swap(&mut self.points, &mut self.other_points);
         let best = self.registration(alone).best();
         let is_certain = best.is_plausible
-            && self.gate(&best, turn) == Verdict::Refused
+            && is_against(self.gate(&best, turn))
             && self.is_certain(alone, &best);
         if !is_certain {
             std::mem::swap(&mut self.points, &mut self.other_points);
@@ -261,7 +273,9 @@ impl Refiner {
         true
     }
 
-    pub(super) fn with_gyro_heading(
+    /// Updates the heading by a registered pose. Returns that pose with the covariance of a motion
+    /// that has the heading of the filter.
+    pub(super) fn update_heading(
         &mut self,
         scan: &Scan<'_>,
         registered: UncertainMotion,
@@ -269,20 +283,23 @@ impl Refiner {
         let Some(heading) = &mut self.state.heading else {
             return registered;
         };
+        let previous = &self.state.pose;
         let Some(turn) = scan.step.turn else {
-            return heading.reset_to(&registered, &self.state.pose);
+            heading.reset_to(&registered, previous);
+            return registered;
         };
-        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        let scale_before = heading.scale;
-        let updated = heading.update(&registered, &self.state.pose, &turn, drift_share);
+        let taken_back_rad2 = heading.update(&registered, previous, &turn);
         if self.gyro.allows_scale(heading.scale) {
-            return updated;
+            let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+            let mut covariance = turn.covariance(&registered.covariance, drift_share);
+            covariance[(2, 2)] += taken_back_rad2;
+            return UncertainMotion {
+                covariance,
+                ..registered
+            };
         }
-        match heading.verdict {
-            // Either the match or the gyro has a gross error, so the scale is not updated.
-            Verdict::Doubted => heading.scale = scale_before,
-            _ => heading.verdict = Verdict::Refused,
-        }
-        heading.reset_to(&registered, &self.state.pose)
+        heading.verdict = Verdict::Refused;
+        heading.reset_to(&registered, previous);
+        registered
     }
 }

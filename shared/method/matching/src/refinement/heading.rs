@@ -1,28 +1,26 @@
-//! The heading by gyro and radar together: a Kalman filter over the heading against the map, the
-//! bias of the gyro and its scale, and the yaw bias of registration.
+//! The heading by gyro and radar together: an error-state Kalman filter (Solà 2017, 5 to 7) over
+//! the heading, the drift of the radar's heading, and the bias and the scale of the gyro.
 //!
-//! The gyro predicts the heading of the next scan, and registration measures it against the map.
-//! While the vehicle stands the map stays, so that the bias is observed well. While it drives, the
-//! map is rebuilt from its own scans and follows a wrong bias; and a small steady error of
-//! registration, the *yaw bias*, drags the map along as a gyro bias would. The covariance includes
-//! both.
+//! The radar measures the heading in the local map. A registration errs by white jitter, which the
+//! next registration takes back, so that the errors of successive motions are correlated; and the
+//! map drifts, a random walk over the distance (coloured noise as a further state: Bar-Shalom, Li,
+//! Kirubarajan, 8.3). The gyro predicts the heading. The tracker and its map stay the radar's
+//! alone; reported motions have the heading of the filter.
 
 use gyre_geometry::{
-    Pose, UncertainMotion, pose,
+    Pose, UncertainMotion,
     samples::{GyroConfig, GyroTurn},
-    wrap_angle, xy_yaw,
+    wrap_angle,
 };
-use nalgebra::{Matrix4, RowVector4, Vector4};
+use nalgebra::{Matrix3, Matrix4, RowVector4, Vector4};
 use serde::{Deserialize, Serialize};
 
 /// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
 /// one of them is wrong: four standard deviations.
 pub(super) const GATE: f64 = 16.0;
-/// Standard deviation of the yaw bias of registration, rad, and the time over which it changes, s.
-/// A map that lags by 1.4 s drifts with it by 0.1 degrees in a minute, as the radar alone does on
-/// six simulated roads.
-const YAW_BIAS_SIGMA_RAD: f64 = 4e-5;
-const YAW_BIAS_TIME_S: f64 = 60.0;
+/// Drift of the radar's heading, rad/√m: 0.03 degrees per square root of 100 m. The trajectories
+/// hardly depend on it between 0.01 and 0.1 degrees.
+const DRIFT_RAD_PER_SQRT_M: f64 = 5.2e-5;
 /// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s. It is
 /// the residual of the best bias and scale in the turns over 4 to 16 s on six simulated roads,
 /// whose gradient is 2.6 % RMS along and across.
@@ -35,24 +33,28 @@ const SCALE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
 /// The states, in the order of the covariance.
 const HEADING: usize = 0;
-const BIAS: usize = 1;
-const YAW_BIAS: usize = 2;
+const DRIFT: usize = 1;
+const BIAS: usize = 2;
 const SCALE: usize = 3;
-/// The part that each has in a registered heading against the predicted one.
-const SEEN: RowVector4<f64> = RowVector4::new(1.0, 0.0, 1.0, 0.0);
+/// The part that each has in a registered heading.
+const SEEN: RowVector4<f64> = RowVector4::new(1.0, 1.0, 0.0, 0.0);
 
-/// The bias and the scale of the gyro, and the steady error of the radar.
+/// The heading, the drift of the map, and the bias and the scale of the gyro.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heading {
+    /// The heading minus the heading of the tracker's pose in the map, rad.
+    pub correction_rad: f64,
+    /// The heading in the map minus the heading, but for jitter, rad.
+    pub drift_rad: f64,
     pub bias_radps: f64,
-    pub yaw_bias_rad: f64,
-    /// True turn over the one that is measured, but for the bias. With one that the gyro cannot
-    /// have ([`GyroConfig::allows_scale`]) it is not used any more.
+    /// True turn over the measured turn, but for the bias. A gyro with a scale that it cannot have
+    /// ([`GyroConfig::allows_scale`]) is not used any more.
     pub scale: f64,
-    /// Covariance of the errors of the heading against the map, the bias, the yaw bias and the
-    /// scale.
+    /// Covariance of the errors of heading, drift, bias and scale.
     pub covariance: Matrix4<f64>,
     pub verdict: Verdict,
+    /// Correction and jitter at the last reported pose, rad.
+    pub reported_rad: [f64; 2],
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,7 +62,7 @@ pub enum Verdict {
     /// Noise can bring both so far apart.
     #[default]
     Agrees,
-    /// Noise cannot, but a match can err by so much: they are weighed all the same.
+    /// Noise cannot, but a single match can err by so much.
     Doubted,
     /// The gyro is wrong: it is not used.
     Refused,
@@ -76,6 +78,9 @@ pub struct GyroBias {
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PredictedTurn {
+    /// The turn by the gyro, rad.
+    turn_rad: f64,
+    /// From the tracker's pose to the predicted heading in the map, rad.
     pub yaw_rad: f64,
     pub variance_rad2: f64,
     pub sweep_rate_radps: f64,
@@ -94,11 +99,20 @@ impl PredictedTurn {
     pub fn variance_after_rad2(&self, [time_s, angle_rad]: [f64; 2]) -> f64 {
         self.noise_rad2
             + self.bias_radps2 * grown(self.interval_s, time_s)
-            + self.scale_variance * grown(self.yaw_rad, angle_rad)
+            + self.scale_variance * grown(self.turn_rad, angle_rad)
     }
 
     pub fn is_certain(&self) -> bool {
-        self.yaw_rad.powi(2) > GATE * self.variance_rad2
+        self.turn_rad.powi(2) > GATE * self.variance_rad2
+    }
+
+    /// Returns the covariance of a registered motion, weighed with this turn. `drift_share` is the
+    /// share of the covariance that accumulates; the error of the gyro accumulates whole.
+    pub fn covariance(&self, registered: &Matrix3<f64>, drift_share: f64) -> Matrix3<f64> {
+        let variance_rad2 = registered[(2, 2)];
+        let less = variance_rad2.min(self.variance_rad2 / drift_share) - variance_rad2;
+        let by_yaw = registered.column(2) / variance_rad2;
+        registered + by_yaw * by_yaw.transpose() * less
     }
 
     /// The registered heading against the predicted one, rad. `previous` is the pose of the scan
@@ -114,16 +128,20 @@ pub(super) fn grown(step: f64, sum: f64) -> f64 {
     (step * (step + 2.0 * sum)).max(step * step)
 }
 
+/// The variance of the jitter of a registered heading, rad²: the motion between two of them has
+/// the jitter of both.
+fn jitter_rad2(registered: &UncertainMotion) -> f64 {
+    0.5 * registered.covariance[(2, 2)]
+}
+
 impl Heading {
     pub(super) fn new(config: &GyroConfig) -> Self {
         let [bias, scale] = [config.bias_sigma_radps, config.scale_sigma].map(|it| it * it);
-        let variances = Vector4::new(0.0, bias, YAW_BIAS_SIGMA_RAD.powi(2), scale);
         Self {
             bias_radps: config.bias_radps,
-            yaw_bias_rad: 0.0,
             scale: 1.0,
-            covariance: Matrix4::from_diagonal(&variances),
-            verdict: Verdict::Agrees,
+            covariance: Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, bias, scale)),
+            ..Self::default()
         }
     }
 
@@ -136,61 +154,64 @@ impl Heading {
         }
     }
 
+    /// Predicts the next heading by the gyro.
     pub(super) fn predict(&mut self, turn: &GyroTurn, config: &GyroConfig) -> PredictedTurn {
         let time_s = turn.interval_s;
-        let turn_rad2 = turn.variance_rad2 + TILT_RAD_PER_SQRT_S.powi(2) * time_s;
+        let noise_rad2 = turn.variance_rad2 + TILT_RAD_PER_SQRT_S.powi(2) * time_s;
         let mut step = Matrix4::identity();
         (step[(HEADING, BIAS)], step[(HEADING, SCALE)]) = (-time_s, turn.yaw_rad);
         self.covariance = step * self.covariance * step.transpose();
-        self.covariance[(HEADING, HEADING)] += turn_rad2;
+        self.covariance[(HEADING, HEADING)] += noise_rad2;
         self.propagate(time_s, config);
         let bias_radps2 = self.covariance[(BIAS, BIAS)];
         let scale_variance = self.covariance[(SCALE, SCALE)];
         let angle_rad = turn.yaw_rad.abs();
+        let turn_rad = self.scale * turn.yaw_rad - self.bias_radps * time_s;
         PredictedTurn {
-            yaw_rad: self.scale * turn.yaw_rad - self.bias_radps * time_s,
-            variance_rad2: turn_rad2
+            turn_rad,
+            yaw_rad: turn_rad + self.jitter_rad(),
+            variance_rad2: noise_rad2
                 + bias_radps2 * time_s * BIAS_TIME_S.max(time_s)
                 + scale_variance * angle_rad * SCALE_TURN_RAD.max(angle_rad),
             sweep_rate_radps: self.scale * turn.sweep_rate_radps - self.bias_radps,
-            noise_rad2: turn_rad2,
+            noise_rad2,
             bias_radps2,
             scale_variance,
             interval_s: time_s,
         }
     }
 
-    /// Propagates the state over a time without a gyro measurement of the turn: the gyro's bias and
-    /// the yaw bias change, and so does the heading. Either [`reset_to`](Self::reset_to) or
-    /// [`inflate`](Self::inflate) sets the heading.
+    /// Propagates the bias over a time.
     pub(super) fn propagate(&mut self, time_s: f64, config: &GyroConfig) {
-        let kept = (-time_s / YAW_BIAS_TIME_S).exp();
-        let step = Matrix4::from_diagonal(&Vector4::new(1.0, 1.0, kept, 1.0));
-        self.covariance = step * self.covariance * step;
         self.covariance[(BIAS, BIAS)] += config.bias_walk_radps_per_sqrt_s.powi(2) * time_s;
-        self.covariance[(YAW_BIAS, YAW_BIAS)] += YAW_BIAS_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
-        self.yaw_bias_rad *= kept;
     }
 
-    /// Takes the heading of a pose that was registered with the map, whatever it was before: the
-    /// gyro has not measured the turn. That is the correction of a prediction without any
-    /// certainty, so that only the yaw bias is taken off. The error is the yaw bias's, which the
-    /// bias may share, plus the noise of registration. The place moves along as in
-    /// [`update`](Self::update).
-    pub(super) fn reset_to(
-        &mut self,
-        registered: &UncertainMotion,
-        previous: &Pose,
-    ) -> UncertainMotion {
-        let variance_rad2 = registered.covariance[(2, 2)];
+    /// The filter's heading in the map minus the heading of the tracker's pose.
+    fn jitter_rad(&self) -> f64 {
+        self.correction_rad + self.drift_rad
+    }
+
+    /// Propagates the drift of the map to a registered pose.
+    fn drift(&mut self, registered: &UncertainMotion, previous: &Pose) {
+        let shift = registered.motion.translation.vector - previous.translation.vector;
+        self.covariance[(DRIFT, DRIFT)] += DRIFT_RAD_PER_SQRT_M.powi(2) * shift.norm();
+    }
+
+    /// Takes the heading of a registered pose whose turn the gyro has not measured: the heading is
+    /// the registered one but for the drift.
+    pub(super) fn reset_to(&mut self, registered: &UncertainMotion, previous: &Pose) {
+        self.drift(registered, previous);
         let mut step = Matrix4::identity();
-        (step[(HEADING, HEADING)], step[(HEADING, YAW_BIAS)]) = (0.0, -1.0);
+        (step[(HEADING, HEADING)], step[(HEADING, DRIFT)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
-        self.covariance[(HEADING, HEADING)] += variance_rad2;
-        UncertainMotion {
-            motion: turned(registered, previous, -self.yaw_bias_rad),
-            ..*registered
-        }
+        self.covariance[(HEADING, HEADING)] += jitter_rad2(registered);
+        self.correction_rad = -self.drift_rad;
+    }
+
+    /// Takes the predicted heading of a scan without a match: the tracker's pose has the filter's
+    /// heading in the map.
+    pub(super) fn take_prediction(&mut self) {
+        self.correction_rad = -self.drift_rad;
     }
 
     /// Takes a heading that neither the gyro nor the map has measured: one that is predicted from
@@ -208,9 +229,9 @@ impl Heading {
         turn: &PredictedTurn,
         jitter_rad: f64,
     ) -> Verdict {
-        let apart_rad = turn.apart_rad(registered, previous) - self.yaw_bias_rad;
+        let apart_rad = turn.apart_rad(registered, previous);
         let variance_rad2 = (SEEN * self.covariance * SEEN.transpose())[0];
-        if apart_rad.powi(2) <= GATE * (variance_rad2 + registered.covariance[(2, 2)]) {
+        if apart_rad.powi(2) <= GATE * (variance_rad2 + jitter_rad2(registered)) {
             Verdict::Agrees
         } else if apart_rad.abs() <= jitter_rad {
             Verdict::Doubted
@@ -219,69 +240,62 @@ impl Heading {
         }
     }
 
-    /// Weighs the heading of a pose that was registered with the map against the predicted one. The
-    /// place moves along as far as its error depends on the heading's. `previous` is the pose of
-    /// the scan before, `drift_share` the share of the covariance that accumulates.
+    /// Weighs the heading of a registered pose against the predicted one. `previous` is the pose of
+    /// the scan before. Returns the variance that the reported motion has beside the gyro's, rad²:
+    /// the error of earlier motions that the motion takes back.
+    ///
+    /// In doubt, either the match or the gyro has a gross error: the heading is the predicted one,
+    /// and the next match decides.
     pub(super) fn update(
         &mut self,
         registered: &UncertainMotion,
         previous: &Pose,
         turn: &PredictedTurn,
-        drift_share: f64,
-    ) -> UncertainMotion {
-        let covariance = registered.covariance;
-        let variance_rad2 = covariance[(2, 2)];
-        let apart = turn.apart_rad(registered, previous);
-        let step_rad = self.correct(apart, variance_rad2) - apart;
-        // The gyro's error accumulates whole.
-        let kept = variance_rad2.min(turn.variance_rad2 / drift_share) - variance_rad2;
-        let by_yaw = covariance.column(2) / variance_rad2;
-        UncertainMotion {
-            motion: turned(registered, previous, step_rad),
-            covariance: covariance + by_yaw * by_yaw.transpose() * kept,
+    ) -> f64 {
+        self.drift(registered, previous);
+        let apart_rad = turn.apart_rad(registered, previous);
+        // The tracker's pose has moved to the registered heading.
+        self.correction_rad = -self.drift_rad - apart_rad;
+        if self.verdict == Verdict::Doubted {
+            return apart_rad.powi(2);
         }
-    }
-
-    /// Takes a registered heading that differs by `apart_rad` from the predicted one. Returns the
-    /// correction of the predicted one.
-    fn correct(&mut self, apart_rad: f64, variance_rad2: f64) -> f64 {
+        let jitter_rad2 = jitter_rad2(registered);
+        let variance_before = self.covariance[(HEADING, HEADING)];
         let across = self.covariance * SEEN.transpose();
-        let gain = across / ((SEEN * across)[0] + variance_rad2);
-        let step = gain * (apart_rad - self.yaw_bias_rad);
+        let gain = across / ((SEEN * across)[0] + jitter_rad2);
+        let step = gain * apart_rad;
+        self.correction_rad += step[HEADING];
+        self.drift_rad += step[DRIFT];
         self.bias_radps += step[BIAS];
-        self.yaw_bias_rad += step[YAW_BIAS];
         self.scale += step[SCALE];
         // Joseph's form stays symmetric and positive.
         let kept = Matrix4::identity() - gain * SEEN;
         self.covariance =
-            kept * self.covariance * kept.transpose() + gain * gain.transpose() * variance_rad2;
-        step[HEADING]
+            kept * self.covariance * kept.transpose() + gain * gain.transpose() * jitter_rad2;
+        variance_before - self.covariance[(HEADING, HEADING)]
     }
 
-    /// A new map starts with the scan before: its heading is the map's.
+    /// Returns a reported motion of the tracker with the heading of the filter.
+    pub(super) fn correct(&mut self, motion: &Pose) -> Pose {
+        let [correction_rad, jitter_rad] = self.reported_rad;
+        self.reported_rad = [self.correction_rad, self.jitter_rad()];
+        Pose::rotation(-jitter_rad)
+            * motion
+            * Pose::rotation(jitter_rad + self.correction_rad - correction_rad)
+    }
+
+    /// A new map starts with the scan before: its error is the error of the heading.
     pub(super) fn start_map(&mut self) {
-        let step = Matrix4::from_diagonal(&Vector4::new(0.0, 1.0, 1.0, 1.0));
-        self.covariance = step * self.covariance * step;
+        let mut step = Matrix4::identity();
+        (step[(DRIFT, DRIFT)], step[(DRIFT, HEADING)]) = (0.0, -1.0);
+        self.covariance = step * self.covariance * step.transpose();
+        self.drift_rad = -self.correction_rad;
     }
 
-    /// The map has a new keyframe, one of `keyframes`: its heading follows the heading of the
-    /// scans.
-    pub(super) fn add_keyframe(&mut self, keyframes: usize) {
-        let kept = 1.0 - 2.0 / (keyframes as f64 + 1.0);
-        let step = Matrix4::from_diagonal(&Vector4::new(kept, 1.0, 1.0, 1.0));
-        self.covariance = step * self.covariance * step;
+    /// A new chain of motions starts with a new map.
+    pub(super) fn start_chain(&mut self) {
+        self.reported_rad = [self.correction_rad, 0.0];
     }
-}
-
-/// The registered pose, turned by an angle: the place moves along as far as its error depends on
-/// the heading's. Its covariance is along the axes of the scan before, whose pose is `previous`,
-/// and the pose along the axes of the map.
-fn turned(registered: &UncertainMotion, previous: &Pose, angle_rad: f64) -> Pose {
-    let covariance = registered.covariance;
-    let step = covariance.column(2) * (angle_rad / covariance[(2, 2)]);
-    let shift = previous.rotation * step.xy();
-    let [x_m, y_m, yaw_rad] = xy_yaw(&registered.motion);
-    pose(x_m + shift.x, y_m + shift.y, yaw_rad + angle_rad)
 }
 
 #[cfg(test)]
