@@ -239,7 +239,7 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     assert_eq!(killed.table(), calm.table());
 }
 
-/// What an array of Slurm executes.
+/// The script of an array of Slurm.
 #[test]
 fn tasks_that_share_the_list_and_the_folder_alone_give_the_same_table() {
     let drives = Drives::new().recordings(&[4, 5, 6]);

@@ -15,8 +15,8 @@ use crate::{
 /// The places of the objects by identity, of each scan that has some.
 type Places = BTreeMap<String, [f64; 2]>;
 
-/// Returns the places of `objects.csv`, in the order of the scans, as a car sees them whose radar, a
-/// metre ahead of its origin, looks to the left.
+/// Returns the places of `objects.csv`, in the order of the scans, as a car sees them whose radar,
+/// a metre ahead of its origin, looks to the left.
 fn expected(run: &Run) -> Vec<Places> {
     let names = ["stamp_ns", "object", "x_m", "y_m"];
     let mut scans: BTreeMap<i64, Places> = BTreeMap::new();

@@ -36,8 +36,8 @@ wire! {
     pub struct Object = "gyre_listed_object_v1" {
         /// The identity: counted from 1, and given to no other object of the run.
         pub id: u64,
-        /// The centre, and the heading in (-pi, pi]: the direction of the velocity, or the network's
-        /// heading for a slow object.
+        /// The centre, and the heading in (-pi, pi]: the direction of the velocity, or the
+        /// network's heading for a slow object.
         pub x_m: f64 [REACH],
         pub y_m: f64 [REACH],
         pub yaw_rad: f64 [Bounds::HalfTurn],

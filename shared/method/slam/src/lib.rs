@@ -17,7 +17,7 @@ mod trajectory;
 mod variance;
 mod verdict;
 
-pub use crate::estimation::places::SUBMAP_REACH_M;
+pub use crate::estimation::places::{LoopCandidate, LoopOutcome, SUBMAP_REACH_M};
 pub use closing::{ClosingError, LoopCloser};
 pub use config::{SlamConfig, SlamKind};
 pub use correction::Correction;
@@ -26,7 +26,7 @@ pub use fixes::{FixCounts, FixRefusal, Fixes};
 pub use gyre_storage::{Record, RecordLog, RecordReader, records_path};
 pub use keyframe::Keyframe;
 pub use keyframe_builder::{KeyframeBuilder, ScanPose};
-pub use loops::{LoopCandidate, LoopOutcome, Query};
+pub use loops::Query;
 pub use place::Place;
 pub use trajectory::{EstimatorKind, TrajectoryEstimator};
 pub use verdict::{JudgedLoop, LoopVerdict};

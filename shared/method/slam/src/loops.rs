@@ -1,30 +1,12 @@
-use crate::estimation::Constraint;
+use crate::estimation::{
+    Constraint,
+    places::{LoopCandidate, LoopOutcome},
+};
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::UncertainMotion;
 use gyre_storage::{LogMagic, Record};
 
 use crate::exact::{ExactMotion, split};
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct LoopCandidate {
-    pub place: usize,
-    pub similarity: f64,
-    /// The pose of the queried keyframe in the frame of the found one, with its covariance; a
-    /// covariance of zero if the two were not aligned.
-    pub motion: UncertainMotion,
-    /// Masked correlation of the submaps at the motion; the search's correlation without an
-    /// alignment.
-    pub correlation: f64,
-    /// Correlation on whole cells at the candidate's angle, of the best translation and of the
-    /// runner-up: another translation, or the best at the other angle. Their difference is the
-    /// margin.
-    pub searched: f64,
-    pub runner_up: f64,
-    /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was
-    /// rejected before.
-    pub chi_square: f64,
-    pub outcome: LoopOutcome,
-}
 
 /// A queried keyframe with its candidates, the most similar one first.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,19 +26,6 @@ struct Fixed {
     runner_up: f64,
     chi_square: f64,
     outcome: u64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LoopOutcome {
-    /// The two submaps show the same place.
-    Accepted,
-    /// The correlation is below 0.65.
-    LowCorrelation,
-    /// Another motion correlates nearly as well: less than 0.1 below.
-    Ambiguous,
-    Undetermined,
-    /// The motion contradicts the odometry between the two keyframes.
-    ContradictsOdometry,
 }
 
 const OUTCOMES: [LoopOutcome; 5] = [

@@ -33,8 +33,9 @@ pub struct Read {
     pub corrected_sketch: Sketch,
 }
 
-/// Reads the journal of a run to its end, which contains `resumed` poses of earlier sessions: writes
-/// the tables row by row, and measures and counts all else. Poses are kept if they are to be judged.
+/// Reads the journal of a run to its end, which contains `resumed` poses of earlier sessions:
+/// writes the tables row by row, and measures and counts all else. Poses are kept if they are to be
+/// judged.
 pub fn read(
     files: &mut Files<'_>,
     out: &Path,

@@ -23,6 +23,7 @@ pub use file::PlaceFileError;
 pub use index::{Candidate, OrderError, PlaceIndex};
 pub use keyframes::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 pub use registrar::Registrar;
+pub use verification::{LoopCandidate, LoopOutcome};
 
 /// Cells per side of a submap's raster, and their size: 102 m to each side.
 const RASTER_CELLS: usize = 255;

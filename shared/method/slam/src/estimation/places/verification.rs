@@ -4,7 +4,6 @@ use gyre_geometry::{UncertainMotion, pose, wrap_angle};
 use gyre_matching::Submap;
 
 use super::{Candidate, Registrar};
-use crate::{LoopCandidate, LoopOutcome};
 
 const MIN_CORRELATION: f64 = 0.65;
 /// Smallest difference of the correlations of an accepted loop and of any other motion between the
@@ -13,6 +12,40 @@ const MIN_MARGIN: f64 = 0.1;
 /// A match on whole cells at an angle of the descriptors' grid is this much below the final one at
 /// most.
 const COARSE_LOSS: f64 = 0.15;
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopCandidate {
+    pub place: usize,
+    pub similarity: f64,
+    /// The pose of the queried keyframe in the frame of the found one, with its covariance; a
+    /// covariance of zero if the two were not aligned.
+    pub motion: UncertainMotion,
+    /// Masked correlation of the submaps at the motion; the search's correlation without an
+    /// alignment.
+    pub correlation: f64,
+    /// Correlation on whole cells at the candidate's angle, of the best translation and of the
+    /// runner-up: another translation, or the best at the other angle. Their difference is the
+    /// margin.
+    pub searched: f64,
+    pub runner_up: f64,
+    /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was
+    /// rejected before.
+    pub chi_square: f64,
+    pub outcome: LoopOutcome,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LoopOutcome {
+    /// The two submaps show the same place.
+    Accepted,
+    /// The correlation is below 0.65.
+    LowCorrelation,
+    /// Another motion correlates nearly as well: less than 0.1 below.
+    Ambiguous,
+    Undetermined,
+    /// The motion contradicts the odometry between the two keyframes.
+    ContradictsOdometry,
+}
 
 impl Registrar {
     /// Verifies a candidate: registers the submap of the query, `later`, with the submap of the
