@@ -110,7 +110,7 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     running.await_child("record", Some(killed));
     running.await_poses(2 * SCANS / 3);
     let moved = moved + move_away(&file(&run), &other_disk);
-    running.finish().succeeded();
+    running.finish().succeeded().says("started again");
     // The rest is a recording without its first part, and reports it.
     let rest = open_recording(&file(&run)).unwrap();
     assert!(rest.absent_parts().contains(&1));
