@@ -284,8 +284,10 @@ impl Heading {
             * Pose::rotation(jitter_rad + self.correction_rad - correction_rad)
     }
 
-    /// A new map starts with the scan before: its error is the error of the heading.
+    /// A new map starts with the scan before: its error is the error of the heading. The tracker's
+    /// pose has no jitter in it.
     pub(super) fn start_map(&mut self) {
+        self.reported_rad[1] -= self.jitter_rad();
         let mut step = Matrix4::identity();
         (step[(DRIFT, DRIFT)], step[(DRIFT, HEADING)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
