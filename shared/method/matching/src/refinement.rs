@@ -335,8 +335,8 @@ impl Refiner {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction;
         if let Some(heading) = &mut self.state.heading {
-            match scan.step.turn {
-                Some(_) => heading.take_prediction(),
+            match &scan.step.turn {
+                Some(turn) => heading.take_prediction(&motion, &self.state.pose, turn),
                 None => heading.inflate(covariance[(2, 2)]),
             }
         }

@@ -115,10 +115,10 @@ impl PredictedTurn {
         registered + by_yaw * by_yaw.transpose() * less
     }
 
-    /// The registered heading against the predicted one, rad. `previous` is the pose of the scan
+    /// The heading of a pose against the predicted one, rad. `previous` is the pose of the scan
     /// before.
-    fn apart_rad(&self, registered: &UncertainMotion, previous: &Pose) -> f64 {
-        let yaw_rad = registered.motion.rotation.angle();
+    fn apart_rad(&self, pose: &Pose, previous: &Pose) -> f64 {
+        let yaw_rad = pose.rotation.angle();
         wrap_angle(yaw_rad - previous.rotation.angle() - self.yaw_rad)
     }
 }
@@ -208,10 +208,15 @@ impl Heading {
         self.correction_rad = -self.drift_rad;
     }
 
-    /// Takes the predicted heading of a scan without a match: the tracker's pose has the filter's
-    /// heading in the map.
-    pub(super) fn take_prediction(&mut self) {
-        self.correction_rad = -self.drift_rad;
+    /// Takes the predicted heading of a scan without a match. The tracker's pose, `predicted`, has
+    /// the filter's heading in the map, or has not turned: without an anchor.
+    pub(super) fn take_prediction(
+        &mut self,
+        predicted: &Pose,
+        previous: &Pose,
+        turn: &PredictedTurn,
+    ) {
+        self.correction_rad = -self.drift_rad - turn.apart_rad(predicted, previous);
     }
 
     /// Takes a heading that neither the gyro nor the map has measured: one that is predicted from
@@ -229,7 +234,7 @@ impl Heading {
         turn: &PredictedTurn,
         jitter_rad: f64,
     ) -> Verdict {
-        let apart_rad = turn.apart_rad(registered, previous);
+        let apart_rad = turn.apart_rad(&registered.motion, previous);
         let variance_rad2 = (SEEN * self.covariance * SEEN.transpose())[0];
         if apart_rad.powi(2) <= GATE * (variance_rad2 + jitter_rad2(registered)) {
             Verdict::Agrees
@@ -253,7 +258,7 @@ impl Heading {
         turn: &PredictedTurn,
     ) -> f64 {
         self.drift(registered, previous);
-        let apart_rad = turn.apart_rad(registered, previous);
+        let apart_rad = turn.apart_rad(&registered.motion, previous);
         // The tracker's pose has moved to the registered heading.
         self.correction_rad = -self.drift_rad - apart_rad;
         if self.verdict == Verdict::Doubted {

@@ -145,6 +145,7 @@ struct Drive {
     /// Measured turn over the true turn.
     measured: f64,
     drift_rad: f64,
+    has_anchor: bool,
     /// The heading by the reported motions.
     reported_rad: f64,
 }
@@ -169,6 +170,7 @@ impl Drive {
             at: Pose::identity(),
             true_rad: 0.0,
             drift_rad: 0.0,
+            has_anchor: seed.is_multiple_of(2),
             reported_rad: 0.0,
         }
     }
@@ -201,8 +203,11 @@ impl Drive {
                 registered.motion
             }
             (false, Some(turn)) => {
-                self.heading.take_prediction();
-                self.at * pose(Self::STEP_M, 0.0, turn.yaw_rad)
+                // Without an anchor the tracker's pose does not turn.
+                let tracked_rad = if self.has_anchor { turn.yaw_rad } else { 0.0 };
+                let at = self.at * pose(Self::STEP_M, 0.0, tracked_rad);
+                self.heading.take_prediction(&at, &self.at, &turn);
+                at
             }
             (false, None) => {
                 self.heading.inflate(Self::GUESS_RAD.powi(2));
