@@ -296,7 +296,7 @@ impl Refiner {
             }
             heading.verdict = Verdict::Refused;
         }
-        heading.reset_to(registered, previous);
+        covariance[(2, 2)] += heading.reset_to(registered, previous);
         covariance
     }
 }

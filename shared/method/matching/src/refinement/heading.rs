@@ -198,14 +198,21 @@ impl Heading {
     }
 
     /// Takes the heading of a registered pose whose turn the gyro has not measured: the heading is
-    /// the registered one but for the drift.
-    pub(super) fn reset_to(&mut self, registered: &UncertainMotion, previous: &Pose) {
+    /// the registered one but for the drift. Returns the variance that the reported motion has
+    /// beside the registered one's, rad²: the error of a doubted turn, which it takes back.
+    pub(super) fn reset_to(&mut self, registered: &UncertainMotion, previous: &Pose) -> f64 {
         self.drift(registered, previous);
         let mut step = Matrix4::identity();
         (step[(HEADING, HEADING)], step[(HEADING, DRIFT)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
-        self.covariance[(HEADING, HEADING)] += jitter_rad2(registered);
+        let jitter_rad2 = jitter_rad2(registered);
+        self.covariance[(HEADING, HEADING)] += jitter_rad2;
         self.correction_rad = -self.drift_rad;
+        let taken_back_rad2 = self.reported_rad[1].powi(2);
+        match taken_back_rad2 > GATE * jitter_rad2 {
+            true => taken_back_rad2,
+            false => 0.0,
+        }
     }
 
     /// Takes the predicted heading of a scan without a match. The tracker's pose, `predicted`, has
