@@ -198,9 +198,13 @@ impl Heading {
     }
 
     /// Takes the heading of a registered pose whose turn the gyro has not measured: the heading is
-    /// the registered one but for the drift. Returns the variance that the reported motion has
-    /// beside the registered one's, rad²: the error of a doubted turn, which it takes back.
+    /// the registered one but for the drift, and no doubt is left. Returns the variance that the
+    /// reported motion has beside the registered one's, rad²: the error of a doubted turn, which it
+    /// takes back.
     pub(super) fn reset_to(&mut self, registered: &UncertainMotion, previous: &Pose) -> f64 {
+        if self.verdict == Verdict::Doubted {
+            self.verdict = Verdict::Agrees;
+        }
         self.drift(registered, previous);
         let mut step = Matrix4::identity();
         (step[(HEADING, HEADING)], step[(HEADING, DRIFT)]) = (0.0, -1.0);
