@@ -202,9 +202,7 @@ impl Heading {
     /// reported motion has beside the registered one's, rad²: the error of a doubted turn, which it
     /// takes back.
     pub(super) fn reset_to(&mut self, registered: &UncertainMotion, previous: &Pose) -> f64 {
-        if self.verdict == Verdict::Doubted {
-            self.verdict = Verdict::Agrees;
-        }
+        self.end_doubt();
         self.drift(registered, previous);
         let mut step = Matrix4::identity();
         (step[(HEADING, HEADING)], step[(HEADING, DRIFT)]) = (0.0, -1.0);
@@ -301,13 +299,20 @@ impl Heading {
     }
 
     /// A new map starts with the scan before: its error is the error of the heading. The tracker's
-    /// pose has no jitter in it.
+    /// pose has no jitter in it, and a match in it decides no doubt of before.
     pub(super) fn start_map(&mut self) {
+        self.end_doubt();
         self.reported_rad[1] -= self.jitter_rad();
         let mut step = Matrix4::identity();
         (step[(DRIFT, DRIFT)], step[(DRIFT, HEADING)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
         self.drift_rad = -self.correction_rad;
+    }
+
+    fn end_doubt(&mut self) {
+        if self.verdict == Verdict::Doubted {
+            self.verdict = Verdict::Agrees;
+        }
     }
 
     /// A new chain of motions starts with a new map.
