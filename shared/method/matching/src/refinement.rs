@@ -33,7 +33,7 @@ use gyre_geometry::{
 pub use heading::{GyroBias, Heading, Verdict};
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
-use nalgebra::{UnitVector2, Vector2};
+use nalgebra::{Matrix3, UnitVector2, Vector2};
 pub use standstill::Standstill;
 pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
@@ -88,6 +88,8 @@ pub struct Refined {
 struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
+    /// The covariance of a motion to the pose that has the heading of the filter.
+    covariance: Matrix3<f64>,
     guess: InitialGuess,
     ahead_m: Vector2<f64>,
     /// Walls without structure have ended: the map is left.
@@ -309,7 +311,8 @@ impl Refiner {
         }
         Accepted {
             outcome,
-            pose: self.update_heading(scan, registered),
+            covariance: self.update_heading(scan, &registered),
+            pose: registered,
             guess: best.guess,
             ahead_m: found.ahead_m,
             leaves_map: found.leaves_map,
@@ -332,8 +335,8 @@ impl Refiner {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction;
         if let Some(heading) = &mut self.state.heading {
-            match scan.step.turn {
-                Some(_) => heading.take_prediction(),
+            match &scan.step.turn {
+                Some(turn) => heading.take_prediction(&motion, &self.state.pose, turn),
                 None => heading.inflate(covariance[(2, 2)]),
             }
         }
@@ -349,6 +352,7 @@ impl Refiner {
         Accepted {
             outcome: Outcome::Predicted,
             pose: UncertainMotion { motion, covariance },
+            covariance,
             guess: InitialGuess::Prediction,
             ahead_m,
             leaves_map: false,
@@ -395,6 +399,7 @@ impl Refiner {
     fn hold_standstill(&mut self, scan: &Scan<'_>, accepted: &Accepted) -> Report {
         let estimate = Estimate {
             pose: accepted.pose,
+            covariance: accepted.covariance,
             previous: self.state.pose,
             outcome: match accepted.guess {
                 InitialGuess::AlongWalls => Outcome::Predicted,

@@ -93,7 +93,7 @@ fn a_gyro_that_was_refused_last_does_not_turn_a_blind_vehicle() {
 }
 
 /// A gyro that is wrong once by two degrees, and a scan that is turned by two degrees as a whole:
-/// which of both errs shows the next match.
+/// the next match shows which of both errs.
 #[test]
 fn a_single_error_of_the_gyro_or_of_a_scan_is_doubted_and_the_next_match_decides() {
     let (drive, mut scans) = bend();
@@ -115,6 +115,9 @@ fn a_single_error_of_the_gyro_or_of_a_scan_is_doubted_and_the_next_match_decides
         let (displacement, _) = off(&drive, refined, 0..SCANS - 1);
         assert!(displacement.rotation.angle().abs() < 4e-3, "{displacement}");
     }
+    // The motion that takes the error of the gyro back has it too.
+    let sigma_rad = by_gyro[start].motion.covariance[(2, 2)].sqrt();
+    assert!(sigma_rad > 0.8 * error_rad, "{sigma_rad} rad");
     let turn_rad = by_scan[start - 1].motion.motion.rotation.angle();
     let off_rad = turn_rad - drive.yaw_rate_radps * SWEEP_S;
     assert!(off_rad.abs() < 0.1 * error_rad, "{off_rad} rad");

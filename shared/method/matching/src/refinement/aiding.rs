@@ -4,6 +4,7 @@ use gyre_geometry::{
     UncertainMotion,
     samples::{DopplerConfig, DopplerDisplacement, WheelDistance, WheelsConfig},
 };
+use nalgebra::Matrix3;
 
 use super::{
     Heading, Refiner, WheelState,
@@ -273,33 +274,29 @@ impl Refiner {
         true
     }
 
-    /// Updates the heading by a registered pose. Returns that pose with the covariance of a motion
+    /// Updates the heading by a registered pose. Returns the covariance of a motion to that pose
     /// that has the heading of the filter.
     pub(super) fn update_heading(
         &mut self,
         scan: &Scan<'_>,
-        registered: UncertainMotion,
-    ) -> UncertainMotion {
+        registered: &UncertainMotion,
+    ) -> Matrix3<f64> {
+        let mut covariance = registered.covariance;
         let Some(heading) = &mut self.state.heading else {
-            return registered;
+            return covariance;
         };
         let previous = &self.state.pose;
-        let Some(turn) = scan.step.turn else {
-            heading.reset_to(&registered, previous);
-            return registered;
-        };
-        let taken_back_rad2 = heading.update(&registered, previous, &turn);
-        if self.gyro.allows_scale(heading.scale) {
-            let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-            let mut covariance = turn.covariance(&registered.covariance, drift_share);
-            covariance[(2, 2)] += taken_back_rad2;
-            return UncertainMotion {
-                covariance,
-                ..registered
-            };
+        if let Some(turn) = scan.step.turn {
+            let taken_back_rad2 = heading.update(registered, previous, &turn);
+            if self.gyro.allows_scale(heading.scale) {
+                let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+                covariance = turn.covariance(&covariance, drift_share);
+                covariance[(2, 2)] += taken_back_rad2;
+                return covariance;
+            }
+            heading.verdict = Verdict::Refused;
         }
-        heading.verdict = Verdict::Refused;
-        heading.reset_to(&registered, previous);
-        registered
+        covariance[(2, 2)] += heading.reset_to(registered, previous);
+        covariance
     }
 }

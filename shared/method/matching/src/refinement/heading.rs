@@ -115,10 +115,10 @@ impl PredictedTurn {
         registered + by_yaw * by_yaw.transpose() * less
     }
 
-    /// The registered heading against the predicted one, rad. `previous` is the pose of the scan
+    /// The heading of a pose against the predicted one, rad. `previous` is the pose of the scan
     /// before.
-    fn apart_rad(&self, registered: &UncertainMotion, previous: &Pose) -> f64 {
-        let yaw_rad = registered.motion.rotation.angle();
+    fn apart_rad(&self, pose: &Pose, previous: &Pose) -> f64 {
+        let yaw_rad = pose.rotation.angle();
         wrap_angle(yaw_rad - previous.rotation.angle() - self.yaw_rad)
     }
 }
@@ -198,20 +198,34 @@ impl Heading {
     }
 
     /// Takes the heading of a registered pose whose turn the gyro has not measured: the heading is
-    /// the registered one but for the drift.
-    pub(super) fn reset_to(&mut self, registered: &UncertainMotion, previous: &Pose) {
+    /// the registered one but for the drift, and no doubt is left. Returns the variance that the
+    /// reported motion has beside the registered one's, rad²: the error of a doubted turn, which it
+    /// takes back.
+    pub(super) fn reset_to(&mut self, registered: &UncertainMotion, previous: &Pose) -> f64 {
+        self.end_doubt();
         self.drift(registered, previous);
         let mut step = Matrix4::identity();
         (step[(HEADING, HEADING)], step[(HEADING, DRIFT)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
-        self.covariance[(HEADING, HEADING)] += jitter_rad2(registered);
+        let jitter_rad2 = jitter_rad2(registered);
+        self.covariance[(HEADING, HEADING)] += jitter_rad2;
         self.correction_rad = -self.drift_rad;
+        let taken_back_rad2 = self.reported_rad[1].powi(2);
+        match taken_back_rad2 > GATE * jitter_rad2 {
+            true => taken_back_rad2,
+            false => 0.0,
+        }
     }
 
-    /// Takes the predicted heading of a scan without a match: the tracker's pose has the filter's
-    /// heading in the map.
-    pub(super) fn take_prediction(&mut self) {
-        self.correction_rad = -self.drift_rad;
+    /// Takes the predicted heading of a scan without a match. The tracker's pose, `predicted`, has
+    /// the filter's heading in the map, or has not turned: without an anchor.
+    pub(super) fn take_prediction(
+        &mut self,
+        predicted: &Pose,
+        previous: &Pose,
+        turn: &PredictedTurn,
+    ) {
+        self.correction_rad = -self.drift_rad - turn.apart_rad(predicted, previous);
     }
 
     /// Takes a heading that neither the gyro nor the map has measured: one that is predicted from
@@ -229,7 +243,7 @@ impl Heading {
         turn: &PredictedTurn,
         jitter_rad: f64,
     ) -> Verdict {
-        let apart_rad = turn.apart_rad(registered, previous);
+        let apart_rad = turn.apart_rad(&registered.motion, previous);
         let variance_rad2 = (SEEN * self.covariance * SEEN.transpose())[0];
         if apart_rad.powi(2) <= GATE * (variance_rad2 + jitter_rad2(registered)) {
             Verdict::Agrees
@@ -253,7 +267,7 @@ impl Heading {
         turn: &PredictedTurn,
     ) -> f64 {
         self.drift(registered, previous);
-        let apart_rad = turn.apart_rad(registered, previous);
+        let apart_rad = turn.apart_rad(&registered.motion, previous);
         // The tracker's pose has moved to the registered heading.
         self.correction_rad = -self.drift_rad - apart_rad;
         if self.verdict == Verdict::Doubted {
@@ -284,12 +298,21 @@ impl Heading {
             * Pose::rotation(jitter_rad + self.correction_rad - correction_rad)
     }
 
-    /// A new map starts with the scan before: its error is the error of the heading.
+    /// A new map starts with the scan before: its error is the error of the heading. The tracker's
+    /// pose has no jitter in it, and a match in it decides no doubt of before.
     pub(super) fn start_map(&mut self) {
+        self.end_doubt();
+        self.reported_rad[1] -= self.jitter_rad();
         let mut step = Matrix4::identity();
         (step[(DRIFT, DRIFT)], step[(DRIFT, HEADING)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
         self.drift_rad = -self.correction_rad;
+    }
+
+    fn end_doubt(&mut self) {
+        if self.verdict == Verdict::Doubted {
+            self.verdict = Verdict::Agrees;
+        }
     }
 
     /// A new chain of motions starts with a new map.

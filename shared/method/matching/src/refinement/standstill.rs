@@ -10,7 +10,7 @@
 mod tests;
 
 use gyre_geometry::{Pose, UncertainMotion, interpolate, xy_yaw};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::Outcome;
@@ -54,6 +54,8 @@ pub struct Standstill {
 pub(super) struct Estimate {
     /// The pose in the first scan's frame, with the covariance of the motion from the scan before.
     pub pose: UncertainMotion,
+    /// The covariance of the reported motion, whose heading may be another sensor's.
+    pub covariance: Matrix3<f64>,
     pub previous: Pose,
     pub outcome: Outcome,
     /// Wheels, Doppler or the gyro measure a motion since the scan before.
@@ -64,11 +66,10 @@ pub(super) struct Estimate {
 impl Estimate {
     /// Returns the motion as estimated, of a vehicle that is not held.
     pub fn unheld(&self) -> Report {
-        let motion = self.previous.inv_mul(&self.pose.motion);
         Report {
             motion: UncertainMotion {
-                motion,
-                ..self.pose
+                motion: self.previous.inv_mul(&self.pose.motion),
+                covariance: self.covariance,
             },
             stationary: false,
         }
@@ -114,7 +115,7 @@ impl Standstill {
             Outcome::Predicted => 1.0,
             Outcome::Refined | Outcome::Weak => self.covariance_factor(&before),
         };
-        let covariance = estimate.pose.covariance * factor;
+        let covariance = estimate.covariance * factor;
         let motion = if self.stands() {
             Pose::identity()
         } else {

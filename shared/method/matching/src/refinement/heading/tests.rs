@@ -93,6 +93,25 @@ fn a_reported_motion_is_along_the_heading_of_the_filter() {
     assert!(off.iter().all(|off| *off < 1e-12), "{motion:?}");
 }
 
+/// The scan that starts a map has no jitter in it, also if an earlier pose was reported last.
+#[test]
+fn a_motion_from_the_first_scan_of_a_map_is_not_turned_by_the_jitter_in_the_old_map() {
+    for moved_rad in [0.0, 0.02] {
+        let mut heading = Heading {
+            correction_rad: 0.01,
+            drift_rad: 0.02,
+            ..Heading::new(&GyroConfig::default())
+        };
+        heading.correct(&Pose::identity());
+        // The tracker turns, and the heading does not.
+        heading.correction_rad -= moved_rad;
+        heading.start_map();
+        let motion = heading.correct(&(Pose::rotation(moved_rad) * pose(2.0, 0.0, 0.0)));
+        let [_, y_m, yaw_rad] = xy_yaw(&motion);
+        assert!(y_m.abs() < 1e-12 && yaw_rad.abs() < 1e-12, "{motion}");
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Event {
     /// The gyro has measured the turn, and the scan is registered.
@@ -126,6 +145,7 @@ struct Drive {
     /// Measured turn over the true turn.
     measured: f64,
     drift_rad: f64,
+    has_anchor: bool,
     /// The heading by the reported motions.
     reported_rad: f64,
 }
@@ -150,6 +170,7 @@ impl Drive {
             at: Pose::identity(),
             true_rad: 0.0,
             drift_rad: 0.0,
+            has_anchor: seed.is_multiple_of(2),
             reported_rad: 0.0,
         }
     }
@@ -182,8 +203,11 @@ impl Drive {
                 registered.motion
             }
             (false, Some(turn)) => {
-                self.heading.take_prediction();
-                self.at * pose(Self::STEP_M, 0.0, turn.yaw_rad)
+                // Without an anchor the tracker's pose does not turn.
+                let tracked_rad = if self.has_anchor { turn.yaw_rad } else { 0.0 };
+                let at = self.at * pose(Self::STEP_M, 0.0, tracked_rad);
+                self.heading.take_prediction(&at, &self.at, &turn);
+                at
             }
             (false, None) => {
                 self.heading.inflate(Self::GUESS_RAD.powi(2));

@@ -74,6 +74,7 @@ impl Drive {
                 motion: self.estimate,
                 covariance: Matrix3::from_diagonal(&variances),
             },
+            covariance: Matrix3::from_diagonal(&variances),
             previous,
             outcome,
             interval_s: INTERVAL_S,
@@ -173,6 +174,7 @@ fn a_standing_vehicle_that_is_not_seen_is_as_uncertain_as_its_prediction() {
             motion: pose(0.0, 0.0, 0.1),
             covariance: Matrix3::identity(),
         },
+        covariance: Matrix3::identity(),
         previous: drive.estimate,
         outcome: Outcome::Predicted,
         interval_s: INTERVAL_S,
@@ -221,4 +223,22 @@ fn covariances_describe_a_stop_and_go() {
     }
     let mean = sum / f64::from(count);
     assert!((0.3..3.0).contains(&mean), "{mean}");
+}
+
+/// The heading of a gyro is better than the headings of the estimates, which are compared.
+#[test]
+fn the_noise_of_the_estimates_decides_and_not_the_covariance_of_the_reported_motion() {
+    let variances = Vector3::from(SIGMA.map(|sigma| sigma * sigma));
+    let held = Standstill::default().next(&Estimate {
+        moves: false,
+        pose: UncertainMotion {
+            motion: pose(0.0, 0.0, 2.0 * SIGMA[2]),
+            covariance: Matrix3::from_diagonal(&variances),
+        },
+        covariance: Matrix3::identity() * 1e-12,
+        previous: Pose::identity(),
+        outcome: Outcome::Refined,
+        interval_s: INTERVAL_S,
+    });
+    assert!(held.stationary && held.motion.covariance.norm() < 1e-10);
 }
