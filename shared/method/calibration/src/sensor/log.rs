@@ -1,4 +1,5 @@
-//! What is compared: turns or distances of a second, by the radar and by the log of a sensor.
+//! The quantities to compare: turns or distances of a second, by the radar and by the log of a
+//! sensor.
 
 use gyre_geometry::samples::Sample;
 use gyre_radar::median;
