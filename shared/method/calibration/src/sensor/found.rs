@@ -75,7 +75,7 @@ impl SensorCalibration {
         self.scale.sigma < self.kind.useful_scale_sigma
     }
 
-    /// Returns its section, with the log if it does not lie beside the scans, and the distance of
+    /// Returns the section, with the log if it does not lie beside the scans, and the distance of
     /// a tick that the scale is of.
     pub fn toml(&self, file: Option<&Path>, m_per_tick: Option<f64>) -> String {
         let (late, scale, bias) = (self.delay_s, self.scale, self.bias);

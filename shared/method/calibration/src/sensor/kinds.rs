@@ -11,7 +11,7 @@ use crate::Track;
 #[derive(Debug)]
 pub struct Kind {
     pub sensor: SampleKind,
-    /// Its name with the verb, for messages.
+    /// The name with the verb, for messages.
     pub subject: &'static str,
     /// The radar's turn (rad) or distance (m) from a scan to the next.
     pub(super) step: fn(&Track, usize, usize) -> f64,
