@@ -1,5 +1,5 @@
-//! `gyre calibrate`: finds the constants of a radar from drives alone, the clock and the axes of a
-//! gyro beside it, and the clock and the scale of the wheels.
+//! `gyre calibrate`: finds the constants of a radar from drives alone, and the clock, the axis and
+//! the scale of the sensors beside it.
 
 mod check;
 mod sensors;
@@ -17,14 +17,11 @@ use gyre_configuration::{
     terminal::{Failure, inputs::Inputs, print},
     with_stored_options,
 };
-use gyre_geometry::{
-    OwnedScan, SweepGeometry,
-    samples::{GyroKind, WheelsKind},
-};
+use gyre_geometry::{OwnedScan, SweepGeometry};
 use gyre_results::{Content, Out};
 use gyre_storage as storage;
 use gyre_tools::bar::Bar;
-use sensors::{Gyro, Wheels};
+use sensors::{Section, Sensor};
 
 #[derive(Debug, Args)]
 pub struct CalibrateArguments {
@@ -70,12 +67,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let file = arguments.out.join(SECTION);
     let _locked = Out::lock_for(&arguments.out, Content::CALIBRATION)?;
     let drives = read_drives(arguments)?;
-    let logs = drives.iter();
-    let of_gyro = logs.filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
-    let gyro = Gyro::section(&of_gyro.collect::<Vec<_>>())?;
-    let logs = drives.iter();
-    let of_wheels = logs.filter_map(|it| Some((it.wheels.as_ref()?, &it.drive)));
-    let wheels = Wheels::section(&of_wheels.collect::<Vec<_>>())?;
+    let sensors = Section::of(&drives)?;
     let radar = found_by(drives, &arguments.out);
     let found = radar.as_ref().ok();
     let ates_m = found.and_then(|it| check::ates_m(arguments, it));
@@ -90,13 +82,13 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         Ok(found) => toml(found),
         // A drive may determine only the other constants: a drive that stands and turns determines
         // only the gyro.
-        Err(error) if gyro.is_told || wheels.is_told => {
+        Err(error) if sensors.is_told => {
             print::note(format_args!("the radar is not calibrated: {error}"));
             format!("# Found by gyre calibrate. The radar is not calibrated: {error}\n")
         }
         Err(_) => return radar.map(|_| ExitCode::SUCCESS),
     };
-    storage::write(&file, text + &gyro.text + &wheels.text)?;
+    storage::write(&file, text + &sensors.text)?;
     let (seconds, file) = (started.elapsed().as_secs_f64(), file.display());
     let advice = match is_worse {
         true => "is NOT recommended",
@@ -107,17 +99,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         print::line(format_args!("{:<21} {check}", "check"))?;
         print::line(found.overlap())?;
     }
-    let refused = gyro.refused.or(wheels.refused);
-    refused.map_or(Ok(ExitCode::SUCCESS), Err)
-}
-
-/// The part of the file that is of a sensor beside the radar.
-#[derive(Default)]
-struct Section {
-    text: String,
-    is_told: bool,
-    /// Why the sensor of a log that was named is not calibrated.
-    refused: Option<Failure>,
+    sensors.refused.map_or(Ok(ExitCode::SUCCESS), Err)
 }
 
 fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {
@@ -150,8 +132,8 @@ struct Recorded {
     name: String,
     drive: Drive,
     configured: Configured,
-    gyro: Option<Gyro>,
-    wheels: Option<Wheels>,
+    /// In the order of the kinds.
+    sensors: Vec<Option<Sensor>>,
 }
 
 impl Recorded {
@@ -160,11 +142,8 @@ impl Recorded {
         mut configuration: Configuration,
         arguments: &CalibrateArguments,
     ) -> Result<Self, Failure> {
-        let gyro = Gyro::read(&configuration, arguments.gyro.as_deref())?;
-        let wheels = Wheels::read(&configuration, arguments.wheels.as_deref())?;
-        // The radar alone: the other sensors are compared with it.
-        configuration.odometry.gyro.kind = GyroKind::None;
-        configuration.odometry.wheels.kind = WheelsKind::None;
+        let sensors = Sensor::read_all(&configuration, arguments)?;
+        sensors::leave_out(&mut configuration.odometry);
         let configuration = &configuration;
         let (drive, geometry) = read(configuration, arguments)?;
         let dataset = with_stored_options(configuration)?.dataset;
@@ -177,8 +156,7 @@ impl Recorded {
                 min_range_m: configuration.odometry.points.min_range_m.into(),
                 distance_m: arguments.distance_m,
             },
-            gyro,
-            wheels,
+            sensors,
         })
     }
 

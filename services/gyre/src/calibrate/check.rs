@@ -3,21 +3,17 @@
 use gyre_calibration::{Found, toml};
 use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_datasets::{DatasetOptions, ground_truth::read_trajectory};
-use gyre_geometry::{
-    OwnedScan,
-    samples::{GyroKind, WheelsKind},
-};
+use gyre_geometry::OwnedScan;
 use gyre_matching::odometry::Odometry;
 use gyre_radar::Trajectory;
 use gyre_results::{judgement::judge, truth_of};
 
-use super::CalibrateArguments;
+use super::{CalibrateArguments, sensors};
 
 /// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.
 pub(super) fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f64; 2]> {
     let mut configuration = arguments.inputs.configuration().ok()?;
-    let odometry = &mut configuration.odometry;
-    (odometry.gyro.kind, odometry.wheels.kind) = (GyroKind::None, WheelsKind::None);
+    sensors::leave_out(&mut configuration.odometry);
     let truth = read_trajectory(&truth_of(&configuration, &arguments.out)?).ok()?;
     let before = ate_m(&configuration, arguments.scans, &truth).ok()?;
     let file: ::toml::Table = toml(found).parse().ok()?;

@@ -1,131 +1,177 @@
-//! The gyro and the wheels beside the scans of a drive: their logs, and the radar's findings about
-//! them.
+//! The sensors beside the scans of a drive: their logs, and the radar's findings about them.
 
-use std::path::{Path, absolute};
+use std::path::{Path, PathBuf, absolute};
 
-use gyre_calibration::{
-    ClockError, Drive, GyroCalibration, WheelCalibration, calibrate_gyro, calibrate_wheels,
-};
+use gyre_calibration::{Drive, Kind, SensorSettings, calibrate_sensor, kinds};
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
 };
-use gyre_datasets::SampleLog;
-use gyre_geometry::samples::{GyroConfig, GyroKind, WheelsConfig};
+use gyre_datasets::{LogError, SampleLog};
+use gyre_geometry::samples::{GyroKind, WheelsKind};
+use gyre_matching::odometry::OdometryConfig;
 
-use super::Section;
+use super::{CalibrateArguments, Recorded};
 
-macro_rules! sensor {
-    (
-        $sensor:ident: $title:literal, $is:literal, $section:ident, $calibrate:ident,
-        $log:ty, $config:ty, $found:ty,
-        beside: $beside:expr, read: $read:expr, mean: $mean:expr, toml: $toml:expr
-    ) => {
-        pub(super) struct $sensor {
-            log: $log,
-            configured: $config,
-            /// It was named, rather than found beside the scans.
-            is_named: bool,
-        }
-
-        impl $sensor {
-            /// A log that lies beside the scans and cannot be used is named, and left alone.
-            pub(super) fn read(
-                configuration: &Configuration,
-                named: Option<&Path>,
-            ) -> Result<Option<Self>, Failure> {
-                let configured = &configuration.odometry.$section;
-                let configured_file = configured.file.as_deref();
-                let named = named.or(configured_file.filter(|_| configured.kind == GyroKind::Log));
-                let file = named.map(Path::to_owned);
-                let (beside, read) = ($beside, $read);
-                let Some(file) = file.or_else(|| beside(&configuration.source.data)) else {
-                    return Ok(None);
-                };
-                match read(&file, configured) {
-                    Ok(log) => Ok(Some(Self {
-                        log,
-                        configured: configured.clone(),
-                        is_named: named.is_some(),
-                    })),
-                    Err(error) if named.is_some() => Err(error.into()),
-                    Err(error) => {
-                        print::note(format_args!("the {} left alone: {error}", $is));
-                        Ok(None)
-                    }
-                }
-            }
-
-            fn calibrate(&self, drive: &Drive) -> Result<Result<$found, ClockError>, Failure> {
-                let track = drive.mean_track()?;
-                let log = self.log.path.display();
-                print::line(format_args!("{:<21} {log}", $title))?;
-                let max_gap_s = self.configured.max_gap_s;
-                let found = $calibrate(drive, &track, &self.log.samples, max_gap_s);
-                match &found {
-                    Ok(found) => print::line(found.table(&self.configured))?,
-                    Err(error) => print::line(format_args!("{:<21} not determined: {error}", ""))?,
-                }
-                Ok(found)
-            }
-
-            pub(super) fn section(logs: &[(&Self, &Drive)]) -> Result<Section, Failure> {
-                let Some((first, _)) = logs.first() else {
-                    return Ok(Section::default());
-                };
-                let (mut told, mut refused) = (Vec::new(), None);
-                for (sensor, drive) in logs {
-                    match sensor.calibrate(drive)? {
-                        Ok(found) => told.push(found),
-                        Err(error) => refused = Some(error),
-                    }
-                }
-                let Some((one, others)) = told.split_first() else {
-                    let reason = refused.as_ref();
-                    let text = reason.map(|it| format!("\n# The {} not calibrated: {it}\n", $is));
-                    return Ok(Section {
-                        text: text.unwrap_or_default(),
-                        is_told: false,
-                        refused: refused.filter(|_| first.is_named).map(Into::into),
-                    });
-                };
-                let (mean, toml) = ($mean, $toml);
-                let found: $found = mean(one, others)?;
-                if !others.is_empty() {
-                    let (sensor, table) = (stringify!($section), found.table(&first.configured));
-                    print::line(format_args!("{sensor}, all drives together\n{table}"))?;
-                }
-                // A relative path is one of the file's folder.
-                let file = first.is_named.then(|| absolute(&first.log.path));
-                let file = file.transpose()?;
-                Ok(Section {
-                    text: toml(&found, file.as_deref(), &first.configured),
-                    is_told: true,
-                    refused: None,
-                })
-            }
-        }
-    };
+/// A kind of sensor: where its settings and its logs are.
+struct Row {
+    kind: &'static Kind,
+    named: fn(&CalibrateArguments) -> Option<&PathBuf>,
+    settings: fn(&OdometryConfig) -> SensorSettings,
+    find: fn(&Path) -> Result<PathBuf, LogError>,
+    read: fn(&Path, &SensorSettings) -> Result<SampleLog, LogError>,
 }
 
-sensor! {
-    Gyro: "gyro, log", "gyro is", gyro, calibrate_gyro,
-    SampleLog, GyroConfig, GyroCalibration,
-    beside: |folder: &Path| SampleLog::find_gyro(folder).ok(),
-    read: |file: &Path, _: &GyroConfig| SampleLog::read_gyro(file),
-    mean: GyroCalibration::mean,
-    toml: |found: &GyroCalibration, file: Option<&Path>, _: &GyroConfig| found.toml(file)
-}
-
-sensor! {
-    Wheels: "wheels, log", "wheels are", wheels, calibrate_wheels,
-    SampleLog, WheelsConfig, WheelCalibration,
-    beside: |folder: &Path| SampleLog::find_wheels(folder).ok(),
-    read: |file: &Path, config: &WheelsConfig| SampleLog::read_wheels(file, config.m_per_tick),
-    mean: |one: &WheelCalibration, others: &[WheelCalibration]| -> Result<_, Failure> {
-        Ok(one.mean(others))
+const ROWS: [Row; 2] = [
+    Row {
+        kind: &kinds::GYRO,
+        named: |arguments| arguments.gyro.as_ref(),
+        settings: |OdometryConfig { gyro, .. }| SensorSettings {
+            is_used: gyro.is_used(),
+            file: gyro.file.clone().filter(|_| gyro.kind == GyroKind::Log),
+            up: gyro.up,
+            m_per_tick: None,
+            delay_s: gyro.delay_s,
+            scale: gyro.scale,
+            max_gap_s: gyro.max_gap_s,
+        },
+        find: SampleLog::find_gyro,
+        read: |file, _| SampleLog::read_gyro(file),
     },
-    toml: |found: &WheelCalibration, file: Option<&Path>, config: &WheelsConfig| {
-        found.toml(file, config.m_per_tick)
+    Row {
+        kind: &kinds::WHEELS,
+        named: |arguments| arguments.wheels.as_ref(),
+        settings: |OdometryConfig { wheels, .. }| SensorSettings {
+            is_used: wheels.is_used(),
+            file: wheels
+                .file
+                .clone()
+                .filter(|_| wheels.kind == WheelsKind::Log),
+            up: None,
+            m_per_tick: wheels.m_per_tick,
+            delay_s: wheels.delay_s,
+            scale: wheels.scale,
+            max_gap_s: wheels.max_gap_s,
+        },
+        find: SampleLog::find_wheels,
+        read: |file, settings| SampleLog::read_wheels(file, settings.m_per_tick),
+    },
+];
+
+/// Leaves the radar alone: the other sensors are compared with it.
+pub(super) fn leave_out(config: &mut OdometryConfig) {
+    (config.gyro.kind, config.wheels.kind) = (GyroKind::None, WheelsKind::None);
+}
+
+/// The log of a sensor in a drive.
+pub(super) struct Sensor {
+    kind: &'static Kind,
+    log: SampleLog,
+    configured: SensorSettings,
+    /// It was named, rather than found beside the scans.
+    is_named: bool,
+}
+
+/// The part of the file that is of the sensors beside the radar.
+#[derive(Default)]
+pub(super) struct Section {
+    pub(super) text: String,
+    pub(super) is_told: bool,
+    /// Why the sensor of a log that was named is not calibrated.
+    pub(super) refused: Option<Failure>,
+}
+
+impl Sensor {
+    /// Reads the logs of a drive, in the order of the kinds.
+    pub(super) fn read_all(
+        configuration: &Configuration,
+        arguments: &CalibrateArguments,
+    ) -> Result<Vec<Option<Self>>, Failure> {
+        let read = |row| Self::read(row, configuration, arguments);
+        ROWS.iter().map(read).collect()
+    }
+
+    /// A log that lies beside the scans and cannot be used is named, and left alone.
+    fn read(
+        row: &Row,
+        configuration: &Configuration,
+        arguments: &CalibrateArguments,
+    ) -> Result<Option<Self>, Failure> {
+        let configured = (row.settings)(&configuration.odometry);
+        let named = (row.named)(arguments).or(configured.file.as_ref()).cloned();
+        let is_named = named.is_some();
+        let beside = || (row.find)(&configuration.source.data).ok();
+        let Some(file) = named.or_else(beside) else {
+            return Ok(None);
+        };
+        match (row.read)(&file, &configured) {
+            Ok(log) => Ok(Some(Self {
+                kind: row.kind,
+                log,
+                configured,
+                is_named,
+            })),
+            Err(error) if is_named => Err(error.into()),
+            Err(error) => {
+                let subject = row.kind.subject;
+                print::note(format_args!("the {subject} left alone: {error}"));
+                Ok(None)
+            }
+        }
+    }
+}
+
+impl Section {
+    /// Calibrates the sensors of all drives, kind by kind.
+    pub(super) fn of(drives: &[Recorded]) -> Result<Self, Failure> {
+        let mut section = Self::default();
+        for kind in 0..ROWS.len() {
+            let logs = drives.iter();
+            let logs = logs.filter_map(|it| Some((it.sensors[kind].as_ref()?, &it.drive)));
+            section.add(&logs.collect::<Vec<_>>())?;
+        }
+        Ok(section)
+    }
+
+    /// Calibrates a sensor by the tracks of drives.
+    fn add(&mut self, logs: &[(&Sensor, &Drive)]) -> Result<(), Failure> {
+        let (mut told, mut refused) = (Vec::new(), None);
+        for (sensor, drive) in logs {
+            let track = drive.mean_track()?;
+            let title = format!("{}, log", sensor.kind.sensor.section());
+            let (log, max_gap_s) = (&sensor.log, sensor.configured.max_gap_s);
+            print::line(format_args!("{title:<21} {}", log.path.display()))?;
+            match calibrate_sensor(sensor.kind, drive, &track, &log.samples, max_gap_s) {
+                Ok(found) => {
+                    print::line(found.table(&sensor.configured))?;
+                    told.push(found);
+                }
+                Err(error) => {
+                    print::line(format_args!("{:<21} not determined: {error}", ""))?;
+                    refused = Some((sensor, error));
+                }
+            }
+        }
+        let (Some((one, others)), Some((first, _))) = (told.split_first(), logs.first()) else {
+            if let Some((sensor, error)) = refused {
+                let is = sensor.kind.subject;
+                self.text += &format!("\n# The {is} not calibrated: {error}\n");
+                if sensor.is_named && self.refused.is_none() {
+                    self.refused = Some(error.into());
+                }
+            }
+            return Ok(());
+        };
+        let found = one.mean(others)?;
+        if !others.is_empty() {
+            let (section, table) = (first.kind.sensor.section(), found.table(&first.configured));
+            print::line(format_args!("{section}, all drives together\n{table}"))?;
+        }
+        // A relative path is one of the file's folder.
+        let file = first.is_named.then(|| absolute(&first.log.path));
+        let file = file.transpose()?;
+        self.text += &found.toml(file.as_deref(), first.configured.m_per_tick);
+        self.is_told = true;
+        Ok(())
     }
 }

@@ -135,15 +135,6 @@ impl Drive {
         Ok(points)
     }
 
-    pub(crate) fn stamps(&self) -> (Vec<i64>, Vec<bool>) {
-        let stamps = self.sweeps.iter().map(|sweep| sweep.stamp_ns);
-        (stamps.collect(), self.starts())
-    }
-
-    fn starts(&self) -> Vec<bool> {
-        self.sweeps.iter().map(|it| it.interval_s <= 0.0).collect()
-    }
-
     pub(crate) fn points(&self, scan: usize, change: &FactVector) -> Vec<SparsePoint> {
         let points = self.sweeps[scan].points.iter();
         points
@@ -213,7 +204,8 @@ impl Track {
         let twists = (0..poses.len())
             .map(|scan| twist_at(&poses, drive, scan))
             .collect();
-        let starts = drive.starts();
+        let starts = drive.sweeps.iter().map(|it| it.interval_s <= 0.0);
+        let starts = starts.collect();
         Self {
             poses,
             motions,

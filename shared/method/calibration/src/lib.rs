@@ -3,17 +3,15 @@
 //! A wrong constant displaces the echoes of a scan by a smooth field, which moves with the vehicle.
 //! So two scans of one place from different poses cannot coincide: the slope of their overlap by
 //! each constant, at the relative pose that is best for it, shows the direction of the right one.
-//! Wrong constants also make the track drift. [`calibrate`] solves both; [`calibrate_gyro`] and
-//! [`calibrate_wheels`] find the clocks of the other sensors by the same track.
+//! Wrong constants also make the track drift. [`calibrate`] solves both;
+//! [`calibrate_sensor`] finds the clocks of the other sensors by the same track.
 
 mod calibrate;
-mod delay;
 mod drift;
 mod drive;
 mod error;
 mod facts;
 mod findings;
-mod gyro;
 mod image;
 mod overlap;
 mod own_reflections;
@@ -21,22 +19,22 @@ mod pair;
 mod picture;
 mod revisits;
 mod section;
+mod sensor;
 mod study;
-mod wheels;
 
 pub use calibrate::{Calibration, FactEstimate, calibrate};
-pub use delay::{Compared, delay};
 pub use drive::{Drive, Sweep, Track};
 pub use error::CalibrationError;
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};
 pub use findings::{Configured, Found};
-pub use gyro::{ClockError, GyroCalibration, calibrate_gyro};
 pub use own_reflections::OwnReflections;
 pub use picture::svg;
 pub use revisits::Revisit;
 pub use section::toml;
+pub use sensor::{
+    ClockError, Compared, Kind, SensorCalibration, SensorSettings, calibrate_sensor, delay, kinds,
+};
 pub use study::Study;
-pub use wheels::{WheelCalibration, calibrate_wheels};
 
 use std::fmt;
 

@@ -1,9 +1,12 @@
-//! Least squares for scale, bias and offset of a gyro, and for the drift of its clock.
+//! Least squares for scale, bias and offset of a sensor, and for the drift of its clock.
 
 use gyre_radar::median;
 use nalgebra::{Matrix4, Vector4};
 
-use super::{angles::Angles, search::Peak, turns::Turn};
+use super::{
+    log::{Log, Stretch},
+    search::Peak,
+};
 use crate::{BLOCKS, Estimate, jackknife};
 
 /// Solutions of the linearised residuals, at most, and the change of the offset that ends them, s.
@@ -17,63 +20,58 @@ const OF_MEDIAN: f64 = 1.4826;
 const NEAR_S: f64 = 1.0;
 
 /// Scale, bias (rad/s), offset (s), drift (s/s):
-/// `yaw = scale * angle(time + offset) - bias * time`.
+/// `amount = scale * logged(time + offset) - bias * time`.
 type Parameters = Vector4<f64>;
 /// Which of them are solved for.
 type Free = [bool; 4];
 
-pub(crate) struct Fit {
+pub(super) struct Fit {
     /// Scale, bias (rad/s) and offset (s) without a drift.
-    pub(crate) parameters: [Estimate; 3],
-    pub(crate) drift: Estimate,
-    pub(crate) turns: usize,
+    pub(super) parameters: [Estimate; 3],
+    pub(super) drift: Estimate,
+    pub(super) count: usize,
 }
 
 impl Fit {
-    /// Fits the turns around a peak; `None` if they do not determine the parameters, or determine a
-    /// different offset than the peak's.
-    /// Speeds have no bias: without one it stays zero.
-    pub(crate) fn new(
-        turns: &[Turn],
-        angles: &Angles,
+    /// Fits the stretches around a peak; `None` if they do not determine the parameters, or
+    /// determine a different offset than the peak's. Speeds have no bias: without one it stays
+    /// zero.
+    pub(super) fn new(
+        stretches: &[Stretch],
+        log: &Log,
         peak: &Peak,
         has_bias: bool,
     ) -> Option<Self> {
-        let (without_drift, with_drift) =
-            ([true, has_bias, true, false], [true, has_bias, true, true]);
-        let sign = peak.correlation.signum();
-        let covered = |turn: &&Turn| {
-            let delay_s = peak.delay_s;
-            angles
-                .between(turn.from_s + delay_s, turn.to_s + delay_s)
-                .is_some()
-        };
-        let turns: Vec<Turn> = turns.iter().filter(covered).copied().collect();
+        let covered = |it: &&Stretch| log.over(it, peak.delay_s).is_some();
+        let stretches: Vec<Stretch> = stretches.iter().filter(covered).copied().collect();
+        let count = stretches.len();
         let problem = Problem {
-            angles,
+            log,
             axis: peak.axis,
-            sign,
-            middle_s: turns.get(turns.len() / 2)?.from_s,
+            sign: peak.correlation.signum(),
+            middle_s: stretches.get(count / 2)?.from_s,
             delay_s: peak.delay_s,
         };
-        let count = turns.len();
         let without = |left_out: Option<usize>, free: Free| {
             let kept = (0..count).filter(|k| Some(k * BLOCKS / count) != left_out);
-            let kept: Vec<Turn> = kept.map(|k| turns[k]).collect();
+            let kept: Vec<Stretch> = kept.map(|k| stretches[k]).collect();
             problem.solve(&kept, free)
         };
-        let estimates = |free: Free| jackknife(|left_out| without(left_out, free));
-        let [scale, bias, late, _] = estimates(without_drift)?;
+        let estimates = |has_drift: bool| {
+            let free = [true, has_bias, true, has_drift];
+            jackknife(|left_out| without(left_out, free))
+        };
+        let [scale, bias, late, _] = estimates(false)?;
         Some(Self {
             parameters: [scale, bias, late],
-            drift: estimates(with_drift).map_or(Estimate::UNKNOWN, |all| all[3]),
-            turns: count,
+            drift: estimates(true).map_or(Estimate::UNKNOWN, |all| all[3]),
+            count,
         })
     }
 }
 
 struct Problem<'a> {
-    angles: &'a Angles,
+    log: &'a Log,
     axis: usize,
     sign: f64,
     /// The time when the offset equals the parameter, s.
@@ -83,10 +81,10 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    fn solve(&self, turns: &[Turn], free: Free) -> Option<Parameters> {
+    fn solve(&self, stretches: &[Stretch], free: Free) -> Option<Parameters> {
         let mut at = Parameters::new(1.0, 0.0, self.delay_s, 0.0);
         for _ in 0..ROUNDS {
-            let rows = self.rows(turns, &at);
+            let rows = self.rows(stretches, &at);
             let sigma = OF_MEDIAN * median(rows.iter().map(|(residual, _)| residual.abs()))?;
             let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
             for (residual, slopes) in &rows {
@@ -112,21 +110,18 @@ impl Problem<'_> {
         Some(at)
     }
 
-    /// The residual of each turn, and its slopes by the parameters.
-    fn rows(&self, turns: &[Turn], at: &Parameters) -> Vec<(f64, Parameters)> {
+    /// The residual of each stretch, and its slopes by the parameters.
+    fn rows(&self, stretches: &[Stretch], at: &Parameters) -> Vec<(f64, Parameters)> {
         let [scale, bias, delay_s, drift] = (*at).into();
-        let row = |turn: &Turn| {
-            let delay_s = delay_s + drift * (turn.from_s - self.middle_s);
-            let turned = self
-                .angles
-                .between(turn.from_s + delay_s, turn.to_s + delay_s)?;
-            let angle = self.sign * turned.angle[self.axis];
-            let time_s = turn.to_s - turn.from_s;
-            let by_late = scale * self.sign * turned.by_late[self.axis];
-            let by_drift = by_late * (turn.from_s - self.middle_s);
-            let slopes = Parameters::new(angle, -time_s, by_late, by_drift);
-            Some((turn.amount - (scale * angle - bias * time_s), slopes))
+        let row = |stretch: &Stretch| {
+            let since_s = stretch.from_s - self.middle_s;
+            let logged = self.log.over(stretch, delay_s + drift * since_s)?;
+            let amount = self.sign * logged.amount[self.axis];
+            let time_s = stretch.to_s - stretch.from_s;
+            let by_late = scale * self.sign * logged.by_late[self.axis];
+            let slopes = Parameters::new(amount, -time_s, by_late, by_late * since_s);
+            Some((stretch.amount - (scale * amount - bias * time_s), slopes))
         };
-        turns.iter().filter_map(row).collect()
+        stretches.iter().filter_map(row).collect()
     }
 }
