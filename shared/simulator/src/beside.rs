@@ -9,7 +9,7 @@ pub mod wheels;
 
 use std::fmt::Write as _;
 
-use gyre_geometry::samples::SampleKind;
+use gyre_geometry::samples::{Sample, SampleKind};
 use nalgebra::SVector;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -55,6 +55,21 @@ pub const KINDS: [Kind; 3] = [
 
 /// The stamp of a sample, ns since 1970, and its values in the order of the columns of the log.
 pub type Record = (i64, [f64; 6]);
+
+/// The samples of a kind that travel with scans, by the records of its row.
+pub fn samples(
+    kind: SampleKind,
+    records: impl FnOnce(&Kind) -> Option<Vec<Record>>,
+) -> Option<Vec<Sample>> {
+    let row = KINDS.iter().find(|row| row.samples == Some(kind))?;
+    let sample = |(stamp_ns, values)| Sample {
+        stamp_ns,
+        kind: kind as u32,
+        reserved: 0,
+        values,
+    };
+    Some(records(row)?.into_iter().map(sample).collect())
+}
 
 impl Kind {
     /// The samples during a drive along a path, which starts at a time (ns since 1970) and lasts

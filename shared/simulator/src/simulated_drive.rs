@@ -16,7 +16,7 @@ use gyre_geometry::{
 use gyre_radar::Trajectory;
 
 use crate::{
-    beside::{KINDS, Kind, Record},
+    beside::{self, KINDS, Kind, Record},
     config::SimulationConfig,
     error::SimulatorError,
     layout::{self, radiate},
@@ -132,15 +132,7 @@ impl SimulatedDrive {
     /// The samples of a sensor beside the radar, by their stamps, as its log has them. `None` if
     /// the drive has no such sensor.
     pub fn samples(&self, kind: SampleKind) -> Option<Vec<Sample>> {
-        let row = KINDS.iter().find(|row| row.samples == Some(kind))?;
-        let sample = |(stamp_ns, values)| Sample {
-            stamp_ns,
-            kind: kind as u32,
-            reserved: 0,
-            values,
-        };
-        let records = self.records(row)?;
-        Some(records.into_iter().map(sample).collect())
+        beside::samples(kind, |row| self.records(row))
     }
 
     fn records(&self, kind: &Kind) -> Option<Vec<Record>> {
