@@ -1,20 +1,16 @@
-//! A GNSS receiver: the section `[simulation.gnss]`, and the log that it leaves.
+//! A GNSS receiver: the section `[simulation.gnss]`, and what the receiver measures.
 
-use std::{f64::consts::TAU, fmt::Write as _};
+use std::f64::consts::TAU;
 
-use gyre_geometry::samples::{Geographic, LocalPlane, RawFix};
+use gyre_geometry::samples::{Geographic, LocalPlane};
+use gyre_simulator::beside::{Device, Drift, Episodes, normal};
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{episodes::Episodes, stream::Stream, TunnelConfig, error::SimulatorError, limits::require_within, path::Path};
+use crate::{stream::Stream, TunnelConfig, error::SimulatorError, limits::require_within, path::Path};
 
-/// The file beside the scans.
-pub(crate) const FILE: &str = "gnss.csv";
-/// The first row of the file.
-const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m";
 /// Time between the places of the path by which its length is measured, seconds.
 const STEP_S: f64 = 0.05;
 
@@ -115,98 +111,75 @@ impl SimulatedGnssConfig {
     }
 }
 
-/// The fixes during a drive, whose start is `start_ns` and which ends `end_s` later, by their
-/// stamps. `None` without a receiver.
-pub(crate) fn fixes(
-    (config, tunnels): (&SimulatedGnssConfig, &[TunnelConfig]),
+/// The receiver of a drive through these tunnels. `None` without a receiver.
+pub(crate) fn device<'a>(
+    config: &'a SimulatedGnssConfig,
+    tunnels: &'a [TunnelConfig],
     seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<RawFix>> {
-    (config.rate_hz > 0.0).then(|| {
-        let mut receiver = Receiver::new(config, seed, path);
-        let count = (end_s * config.rate_hz).ceil() as usize;
-        let fix = |index: usize| {
-            let time_s = index as f64 / config.rate_hz;
-            let place = receiver.measure(time_s, tunnels)?;
-            Some(RawFix {
-                stamp_ns: start_ns + ((time_s + config.late_s) * 1e9).round() as i64,
-                at: [place.latitude_deg, place.longitude_deg],
-                sigma_m: config.noise_m.hypot(config.bias_m),
-                ..RawFix::default()
-            })
-        };
-        (0..count).filter_map(fix).collect()
+    path: &'a dyn Path,
+) -> Option<Device<'a>> {
+    let [latitude_deg, longitude_deg] = config.origin_deg;
+    let origin = Geographic {
+        latitude_deg,
+        longitude_deg,
+    };
+    let plane = LocalPlane::new(origin, 0.0);
+    let mut errors = Stream::GnssErrors.generator(seed);
+    let bias_m = normal(&mut errors) * config.bias_m;
+    let mut bias_m = Drift::<2>::new(config.bias_m, config.bias_lasts_s, config.rate_hz, bias_m);
+    let mut surroundings = Surroundings::new(config, seed, path);
+    let holes = Stream::GnssHoles.generator(seed);
+    (config.rate_hz > 0.0).then(|| Device {
+        rate_hz: config.rate_hz,
+        stamped_at: 0.0,
+        errors,
+        host: None,
+        clock: Box::new(|_, time_s| time_s + config.late_s),
+        lost: Some(config.lost),
+        episodes: Episodes::new(config.hole_every_s, config.hole_s, holes),
+        stalls: false,
+        measure: Box::new(move |rng, [time_s, _], is_hole| {
+            bias_m.step(rng);
+            let noise_m = normal(rng) * config.noise_m;
+            let error_m = bias_m.value + noise_m + surroundings.reflected(time_s);
+            let driven_m = surroundings.driven_m(time_s);
+            let is_inside = |tunnel: &TunnelConfig| {
+                (tunnel.from_m..tunnel.from_m + tunnel.length_m).contains(&driven_m)
+            };
+            if is_hole || tunnels.iter().any(is_inside) {
+                return None;
+            }
+            let antenna = path.pose(time_s) * Point2::from(config.lever_m) + error_m;
+            let place = plane.place([antenna.x, antenna.y]);
+            let sigma_m = config.noise_m.hypot(config.bias_m);
+            Some([place.latitude_deg, place.longitude_deg, sigma_m, 0.0, 0.0, 0.0])
+        }),
     })
 }
 
-/// The fixes as CSV: the numbers read from it are those of the fixes.
-pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
-    let mut text = format!("{HEADER}\n");
-    for fix in fixes {
-        let [latitude_deg, longitude_deg] = fix.at;
-        let (stamp_ns, sigma_m) = (fix.stamp_ns, fix.sigma_m);
-        let _ = writeln!(text, "{stamp_ns},{latitude_deg},{longitude_deg},{sigma_m}");
-    }
-    text.into_bytes()
-}
-
-struct Receiver<'a> {
+/// Reflections, and the way that the radar has driven.
+struct Surroundings<'a> {
     config: &'a SimulatedGnssConfig,
     path: &'a dyn Path,
-    plane: LocalPlane,
-    rng: ChaCha8Rng,
-    bias_m: Vector2<f64>,
     reflections: Episodes,
     directions: ChaCha8Rng,
     /// When the last reflection began, s, and where it moves the fixes to.
     reflection: (f64, Vector2<f64>),
-    holes: Episodes,
     /// Time up to which the way is measured, s, and the way, m.
     way: (f64, f64),
 }
 
-impl<'a> Receiver<'a> {
+impl<'a> Surroundings<'a> {
     fn new(config: &'a SimulatedGnssConfig, seed: u64, path: &'a dyn Path) -> Self {
-        let [latitude_deg, longitude_deg] = config.origin_deg;
-        let origin = Geographic {
-            latitude_deg,
-            longitude_deg,
-        };
-        let mut rng = Stream::GnssErrors.generator(seed);
-        let bias_m = normal(&mut rng) * config.bias_m;
         let reflections = Stream::GnssReflections.generator(seed);
-        let holes = Stream::GnssHoles.generator(seed);
         Self {
             config,
             path,
-            plane: LocalPlane::new(origin, 0.0),
-            rng,
-            bias_m,
             reflections: Episodes::new(config.reflection_every_s, config.reflection_s, reflections),
             directions: Stream::GnssDirections.generator(seed),
             reflection: (f64::NEG_INFINITY, Vector2::zeros()),
-            holes: Episodes::new(config.hole_every_s, config.hole_s, holes),
             way: (0.0, 0.0),
         }
-    }
-
-    /// The place that is measured at a time of the drive, s; `None` without a fix.
-    fn measure(&mut self, time_s: f64, tunnels: &[TunnelConfig]) -> Option<Geographic> {
-        let config = self.config;
-        let kept = (-1.0 / (config.rate_hz * config.bias_lasts_s)).exp();
-        let fresh = config.bias_m * (1.0 - kept * kept).sqrt();
-        self.bias_m = self.bias_m * kept + normal(&mut self.rng) * fresh;
-        let noise_m = normal(&mut self.rng) * config.noise_m;
-        let is_lost = self.rng.random::<f64>() < config.lost;
-        let error_m = self.bias_m + noise_m + self.reflected(time_s);
-        let driven_m = self.driven_m(time_s);
-        let is_inside = |tunnel: &TunnelConfig| {
-            (tunnel.from_m..tunnel.from_m + tunnel.length_m).contains(&driven_m)
-        };
-        let has_none = self.holes.begin_s(time_s).is_some() || tunnels.iter().any(is_inside);
-        let antenna = self.path.pose(time_s) * Point2::from(config.lever_m) + error_m;
-        (!is_lost && !has_none).then(|| self.plane.place([antenna.x, antenna.y]))
     }
 
     /// Where a reflection moves a fix, m.
@@ -235,13 +208,10 @@ impl<'a> Receiver<'a> {
     }
 }
 
-/// Two numbers of the standard normal distribution.
-fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
-    Vector2::from_fn(|_, _| rng.sample(StandardNormal))
-}
-
 #[cfg(test)]
 mod tests {
+    use gyre_simulator::beside::{KINDS, Record};
+
     use super::*;
     use crate::{SimulationConfig, Simulator, drive::DriveKind};
 
@@ -249,7 +219,7 @@ mod tests {
     fn simulated(
         gnss: SimulatedGnssConfig,
         tunnels: Vec<TunnelConfig>,
-    ) -> (Vec<RawFix>, Vec<Vector2<f64>>) {
+    ) -> (Vec<Record>, Vec<Vector2<f64>>) {
         let mut config = SimulationConfig {
             scans: Some(120),
             gnss,
@@ -260,19 +230,16 @@ mod tests {
         config.drive.speed_mps = 8.0;
         config.drive.length_m = 300.0;
         let simulator = Simulator::new(&config).expect("a drive");
-        let fixes = simulator.gnss_fixes().unwrap_or_default();
-        let plane = LocalPlane::new(
-            RawFix {
-                at: config.gnss.origin_deg,
-                ..RawFix::default()
-            }
-            .geographic(),
-            0.0,
-        );
-        let errors = fixes.iter().map(|fix| {
-            let time_s = (fix.stamp_ns - simulator.span().0) as f64 * 1e-9 - config.gnss.late_s;
+        let fixes = simulator.records(&KINDS[2]).unwrap_or_default();
+        let place = |[latitude_deg, longitude_deg]: [f64; 2]| Geographic {
+            latitude_deg,
+            longitude_deg,
+        };
+        let plane = LocalPlane::new(place(config.gnss.origin_deg), 0.0);
+        let errors = fixes.iter().map(|(stamp_ns, values)| {
+            let time_s = (stamp_ns - simulator.span().0) as f64 * 1e-9 - config.gnss.late_s;
             let antenna = simulator.path().pose(time_s) * Point2::from(config.gnss.lever_m);
-            Vector2::from(plane.east_north(fix.geographic())) - antenna.coords
+            Vector2::from(plane.east_north(place([values[0], values[1]]))) - antenna.coords
         });
         let errors = errors.collect();
         (fixes, errors)
@@ -315,7 +282,7 @@ mod tests {
             (0..errors_m.len() - 20).map(of).sum::<f64>() / (errors_m.len() - 20) as f64
         };
         let variance_m2 = mean(&|at| 0.5 * errors_m[at].norm_squared());
-        let stated_m2 = fixes[0].sigma_m.powi(2);
+        let stated_m2 = fixes[0].1[2].powi(2);
         assert!(
             (0.7..1.4).contains(&(variance_m2 / stated_m2)),
             "{variance_m2}"
@@ -350,7 +317,7 @@ mod tests {
         let (fixes, _) = simulated(exact(), vec![tunnel]);
         let gaps_ns = fixes
             .windows(2)
-            .map(|pair| pair[1].stamp_ns - pair[0].stamp_ns);
+            .map(|pair| pair[1].0 - pair[0].0);
         let longest_s = gaps_ns.max().unwrap_or_default() as f64 * 1e-9;
         // 60 m at up to 8 m/s.
         assert!((7.0..20.0).contains(&longest_s), "{longest_s}");

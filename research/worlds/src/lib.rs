@@ -37,7 +37,6 @@
 pub mod body;
 pub mod config;
 pub mod drive;
-mod episodes;
 pub mod error;
 pub mod gnss;
 pub mod gyro;

@@ -4,9 +4,10 @@
 use std::path::PathBuf;
 
 use gyre_datasets::{DatasetOptions, Format, ImageSize, ImageSource};
-use gyre_geometry::{samples::Sample, OwnedScan, ScanSlot};
+use gyre_geometry::{samples::{Sample, SampleKind}, OwnedScan, ScanSlot};
+use gyre_simulator::beside::{KINDS, Kind};
 
-use crate::{config::SimulationConfig, error::SimulatorError, gyro::log, layout::{side_file::SideFile, boreas, oxford, radiate}, objects, output::{HostStamps, OutputFormat}, profile::{Chirp, METADATA_BYTES}, sensor::{Sensor, effects::is_on}, simulator::Simulator, truth, gnss, wheels};
+use crate::{config::SimulationConfig, error::SimulatorError, layout::{side_file::SideFile, boreas, oxford, radiate}, objects, output::{HostStamps, OutputFormat}, profile::{Chirp, METADATA_BYTES}, sensor::{Sensor, effects::is_on}, simulator::Simulator, truth};
 
 /// A simulated drive in a dataset format.
 #[derive(Clone)]
@@ -127,16 +128,10 @@ impl SimulatedDrive {
         )
     }
 
-    /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
-    /// `imu.csv` has them. `None` without a gyro.
-    pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        self.simulator.gyro_samples()
-    }
-
-    /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
-    /// that measure.
-    pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        self.simulator.wheel_samples()
+    /// The samples of a sensor beside the radar, by their stamps, as its log has them. `None` if
+    /// the drive has no such sensor.
+    pub fn samples(&self, kind: SampleKind) -> Option<Vec<Sample>> {
+        self.simulator.samples(kind)
     }
 
     /// All files beside the images.
@@ -160,16 +155,11 @@ impl SimulatedDrive {
             objects::FILE.into(),
             objects::csv(&self.simulator, stamps_ns),
         ));
-        files.extend(
-            self.gyro_samples()
-                .map(|samples| (log::FILE.into(), log::csv(&samples))),
-        );
-        files.extend(
-            self.wheel_samples()
-                .map(|samples| (wheels::FILE.into(), wheels::csv(&samples))),
-        );
-        let fixes = self.simulator.gnss_fixes();
-        files.extend(fixes.map(|fixes| (gnss::FILE.into(), gnss::csv(&fixes))));
+        let log = |kind: &Kind| {
+            let records = self.simulator.records(kind)?;
+            Some((kind.file.into(), kind.csv(&records).into_bytes()))
+        };
+        files.extend(KINDS.iter().filter_map(log));
         files
     }
 

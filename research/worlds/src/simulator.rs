@@ -2,10 +2,11 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use gyre_geometry::{Pose, samples::{RawFix, Sample}, OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_geometry::{Pose, samples::{Sample, SampleKind}, OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_simulator::beside::{self, Kind, Record};
 use nalgebra::Point2;
 
-use crate::{config::{MAX_SCANS, SimulationConfig}, error::SimulatorError, gyro::{Vehicle, log}, path::{Path, recorded::{self, Excerpt}}, profile::Sampling, relief::Relief, sensor::{effects::is_on, PitchRoll, Scene, Sensor, SweepTime}, streets::Streets, town::{ParkedCar, Town}, traffic::{Observer, RoadUser, Traffic}, tunnel, weather::WeatherConfig, world::World, gnss, wheels};
+use crate::{config::{MAX_SCANS, SimulationConfig}, error::SimulatorError, gyro::{self, Vehicle}, path::{Path, recorded::{self, Excerpt}}, profile::Sampling, relief::Relief, sensor::{effects::is_on, PitchRoll, Scene, Sensor, SweepTime}, streets::Streets, town::{ParkedCar, Town}, traffic::{Observer, RoadUser, Traffic}, tunnel, weather::WeatherConfig, world::World, gnss, wheels};
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
 /// Readers check that the year is plausible, and it is fixed so that a configuration always gives
@@ -189,26 +190,26 @@ impl Simulator {
         observer.parked_counts(car, self.parked.iter().any(is_here))
     }
 
-    /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`
-    /// without a gyro.
-    pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        let Self { config, .. } = self;
-        let nods = config.effects.elevation;
-        let pitch_roll = nods.then(|| PitchRoll::new(config.sensor_seed()));
-        let vehicle = Vehicle::new(self.path(), self.world.relief(), pitch_roll);
-        log::samples(&config.gyro, config.gyro_seed(), &vehicle, self.span())
+    /// The samples of a sensor beside the radar, by their stamps, as its log has them. `None` if
+    /// the drive has no such sensor.
+    pub fn samples(&self, kind: SampleKind) -> Option<Vec<Sample>> {
+        beside::samples(kind, |row| self.records(row))
     }
 
-    /// The samples of the wheels, by their stamps. `None` without wheels that measure.
-    pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
-        let seed = self.config.wheels_seed();
-        wheels::samples(&self.config.wheels, seed, self.path(), self.span())
-    }
-
-    /// The fixes of the GNSS receiver, by their stamps, in degrees. `None` without a receiver.
-    pub fn gnss_fixes(&self) -> Option<Vec<RawFix>> {
-        let config = (&self.config.gnss, self.config.tunnels.as_slice());
-        gnss::fixes(config, self.config.gnss_seed(), self.path(), self.span())
+    /// The rows of the log of a sensor beside the radar.
+    pub(crate) fn records(&self, kind: &Kind) -> Option<Vec<Record>> {
+        let (config, path) = (&self.config, self.path());
+        let device = match kind.samples {
+            Some(SampleKind::Gyro) => {
+                let nods = config.effects.elevation;
+                let pitch_roll = nods.then(|| PitchRoll::new(config.sensor_seed()));
+                let vehicle = Vehicle::new(path, self.world.relief(), pitch_roll);
+                gyro::device(&config.gyro, config.gyro_seed(), vehicle)
+            }
+            Some(SampleKind::Wheels) => wheels::device(&config.wheels, config.wheels_seed(), path),
+            None => gnss::device(&config.gnss, &config.tunnels, config.gnss_seed(), path),
+        };
+        Some(device?.records(self.span()))
     }
 
     /// The start of the drive, ns since 1970, and its duration, s.

@@ -1,20 +1,10 @@
-//! The speed of the wheels: the section `[simulation.wheels]`, and the log that it leaves.
+//! The speed of the wheels: the section `[simulation.wheels]`, and what the wheels measure.
 
-use std::fmt::Write as _;
-
-use gyre_geometry::{Pose, Twist, samples::Sample};
+use gyre_simulator::beside::{Device, Episodes, wheels::WheelFigures};
 use nalgebra::Translation2;
-use rand::Rng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{episodes::Episodes, error::SimulatorError, limits::require_within, path::Path, stream::Stream};
-
-/// The file beside the scans.
-pub(crate) const FILE: &str = "wheels.csv";
-/// The first row of the file.
-const HEADER: &str = "stamp_ns,speed_m_s";
+use crate::{error::SimulatorError, limits::require_within, path::Path, stream::Stream};
 
 /// The speed by the wheels of the axle that does not steer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -97,93 +87,40 @@ impl SimulatedWheelsConfig {
     }
 }
 
-/// The samples during a drive, whose start is `start_ns` and which ends `end_s` later, by their
-/// stamps: each is the mean over its period, stamped at its middle. `None` without wheels.
-pub(crate) fn samples(
-    config: &SimulatedWheelsConfig,
-    seed: u64,
-    path: &dyn Path,
-    (start_ns, end_s): (i64, f64),
-) -> Option<Vec<Sample>> {
-    (config.rate_hz > 0.0).then(|| {
-        let mut wheels = Wheels::new(config, seed, path);
-        let count = (end_s * config.rate_hz).ceil() as usize;
-        let sample = |index: usize| {
-            let span_s = [index, index + 1].map(|index| index as f64 / config.rate_hz);
-            let middle_s = 0.5 * (span_s[0] + span_s[1]);
-            let speed_mps = wheels.measure(span_s)?;
-            let stamp_ns = start_ns + ((middle_s + config.late_s) * 1e9).round() as i64;
-            Some(Sample::speed(stamp_ns, speed_mps))
-        };
-        (0..count).filter_map(sample).collect()
-    })
-}
-
-/// The samples as CSV: the numbers read from it are those of the samples.
-pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
-    let mut text = format!("{HEADER}\n");
-    for sample in samples {
-        let _ = writeln!(text, "{},{}", sample.stamp_ns, sample.values[0]);
-    }
-    text.into_bytes()
-}
-
-struct Wheels<'a> {
+/// The wheels of a drive. `None` without wheels.
+pub(crate) fn device<'a>(
     config: &'a SimulatedWheelsConfig,
+    seed: u64,
     path: &'a dyn Path,
-    rng: ChaCha8Rng,
-    slips: Episodes,
-    /// Measured speed over the true one.
-    scale: f64,
-}
-
-impl<'a> Wheels<'a> {
-    fn new(config: &'a SimulatedWheelsConfig, seed: u64, path: &'a dyn Path) -> Self {
-        let mut rng = Stream::WheelErrors.generator(seed);
-        let slips = Stream::WheelSlips.generator(seed);
-        let scale = 1.0 + config.scale_sigma * rng.sample::<f64, _>(StandardNormal);
-        Self {
-            config,
-            path,
-            rng,
-            slips: Episodes::new(config.slip_every_s, config.slip_s, slips),
-            scale,
-        }
-    }
-
-    /// The speed that is measured from one time of the drive to another, m/s; `None` if it is lost.
-    fn measure(&mut self, span_s: [f64; 2]) -> Option<f64> {
-        let config = self.config;
-        let [noise, creep] = [0, 1].map(|_| self.rng.sample::<f64, _>(StandardNormal));
-        let is_lost = self.rng.random::<f64>() < config.lost;
-        let [before, after] = span_s.map(|time_s| self.axle(time_s));
-        let duration_s = span_s[1] - span_s[0];
-        let driven_mps = Twist::from_motion(&before.inv_mul(&after), duration_s).vx_mps;
-        let creep_m = config.noise_m_per_sqrt_m * (driven_mps.abs() * duration_s).sqrt() * creep;
-        let rolled_mps = driven_mps + creep_m / duration_s;
-        let turned =
-            self.scale * rolled_mps * (1.0 + self.slip(span_s[0])) + config.noise_mps * noise;
-        let speed_mps = match config.step_mps > 0.0 {
-            // Adding zero turns a negative one into a positive one.
-            true => (turned / config.step_mps).round() * config.step_mps + 0.0,
-            false => turned,
-        };
-        (!is_lost).then_some(speed_mps)
-    }
-
-    fn axle(&self, time_s: f64) -> Pose {
-        self.path.pose(time_s) * Translation2::new(-self.config.radar_ahead_m, 0.0)
-    }
-
-    /// The share by which the wheels turn too fast.
-    fn slip(&mut self, time_s: f64) -> f64 {
-        let slip_s = self.slips.begin_s(time_s);
-        slip_s.map_or(0.0, |_| self.config.slip_share)
-    }
+) -> Option<Device<'a>> {
+    let figures = WheelFigures {
+        scale_sigma: config.scale_sigma,
+        creep_m_per_sqrt_m: config.noise_m_per_sqrt_m,
+        noise_mps: config.noise_mps,
+        step_mps: config.step_mps,
+        slip_share: config.slip_share,
+    };
+    let mut errors = Stream::WheelErrors.generator(seed);
+    let axle = Translation2::new(-config.radar_ahead_m, 0.0);
+    let measure = figures.measure(&mut errors, move |time_s| path.pose(time_s) * axle);
+    let slips = Stream::WheelSlips.generator(seed);
+    (config.rate_hz > 0.0).then(|| Device {
+        rate_hz: config.rate_hz,
+        stamped_at: 0.5,
+        errors,
+        host: None,
+        clock: Box::new(|_, time_s| time_s + config.late_s),
+        lost: Some(config.lost),
+        episodes: Episodes::new(config.slip_every_s, config.slip_s, slips),
+        stalls: false,
+        measure,
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use gyre_geometry::samples::{Sample, SampleKind};
+
     use super::*;
     use crate::{SimulationConfig, Simulator};
 
@@ -195,7 +132,7 @@ mod tests {
         };
         config.drive.speed_mps = 8.0;
         let simulator = Simulator::new(&config).expect("a drive");
-        let samples = simulator.wheel_samples().unwrap_or_default();
+        let samples = simulator.samples(SampleKind::Wheels).unwrap_or_default();
         (simulator, samples)
     }
 
@@ -213,7 +150,7 @@ mod tests {
     #[test]
     fn without_a_rate_there_are_no_wheels() {
         let (simulator, _) = simulated(SimulatedWheelsConfig::default());
-        assert_eq!(simulator.wheel_samples(), None);
+        assert_eq!(simulator.samples(SampleKind::Wheels), None);
     }
 
     #[test]
@@ -260,24 +197,5 @@ mod tests {
         assert_eq!(slips + rolls, ratios.len());
         // A quarter of ten seconds.
         assert!((115..=135).contains(&slips), "{slips}");
-    }
-
-    #[test]
-    fn a_log_has_the_numbers_of_its_samples() {
-        let (_, samples) = simulated(SimulatedWheelsConfig {
-            lost: 0.1,
-            ..SimulatedWheelsConfig {
-                rate_hz: 50.0,
-                ..SimulatedWheelsConfig::default()
-            }
-        });
-        assert!((400..500).contains(&samples.len()));
-        let text = String::from_utf8(csv(&samples)).expect("text");
-        let rows = text.lines().skip(1).zip(&samples);
-        for (row, sample) in rows {
-            let (stamp, speed) = row.split_once(',').expect("two columns");
-            assert_eq!(stamp.parse(), Ok(sample.stamp_ns));
-            assert_eq!(speed.parse(), Ok(sample.values[0]));
-        }
     }
 }

@@ -8,7 +8,7 @@ use gyre_datasets::{
     Dataset, Fingerprint, GnssLog, OpenError, SampleLog, ScanSamples, check_first_scan,
 };
 use gyre_geometry::samples::{
-    DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind,
+    DopplerConfig, GnssKind, GyroConfig, GyroKind, SampleKind, WheelsConfig, WheelsKind,
 };
 use gyre_simulator::SimulatedDrive;
 
@@ -95,7 +95,7 @@ pub fn simulated_samples(
     let path = Path::new("simulation");
     let turns = match gyro.kind {
         GyroKind::Auto => {
-            let Some(samples) = drive.gyro_samples() else {
+            let Some(samples) = drive.samples(SampleKind::Gyro) else {
                 return refused(
                     "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\"",
                 );
@@ -106,7 +106,7 @@ pub fn simulated_samples(
     };
     let speeds = match wheels.kind {
         WheelsKind::Auto => {
-            let Some(samples) = drive.wheel_samples() else {
+            let Some(samples) = drive.samples(SampleKind::Wheels) else {
                 return refused(
                     "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\"",
                 );

@@ -5,13 +5,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    beside::{gnss::SimulatedGnssConfig, gyro::SimulatedGyroConfig, wheels::SimulatedWheelsConfig},
     error::SimulatorError,
-    gnss::SimulatedGnssConfig,
-    gyro::SimulatedGyroConfig,
     output::{OutputConfig, OutputFormat},
     path::{BlockLoop, Path, recorded},
     sensor::SensorConfig,
-    wheels::SimulatedWheelsConfig,
 };
 
 pub(crate) const MAX_SCANS: usize = 100_000;

@@ -2,12 +2,11 @@
 //! trajectory, as a dataset in Oxford's, Boreas' or RADIATE's format, written to a disk or streamed
 //! into a pipeline. [`simulator`] renders single scans, [`sensor`] measures one sweep.
 
+pub mod beside;
 pub mod body;
 mod cars;
 pub mod config;
 pub mod error;
-pub mod gnss;
-pub mod gyro;
 mod layout;
 mod objects;
 pub mod occlusion;
@@ -20,21 +19,22 @@ pub mod sensor;
 pub mod simulated_drive;
 pub mod simulator;
 mod stream;
-pub mod wheels;
 pub mod world;
 pub mod writer;
 
+pub use beside::{
+    gnss::SimulatedGnssConfig,
+    gyro::{GyroProfile, SimulatedGyroConfig},
+    wheels::SimulatedWheelsConfig,
+};
 pub use body::{Body, Moving};
 pub use config::{DriveConfig, Realism, SimulationConfig};
 pub use error::SimulatorError;
-pub use gnss::SimulatedGnssConfig;
-pub use gyro::{GyroProfile, SimulatedGyroConfig};
 pub use output::{HostStamps, OutputFormat};
 pub use path::{BlockLoop, Path};
 pub use profile::{Profile, Sampling};
 pub use sensor::{Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::Simulator;
-pub use wheels::SimulatedWheelsConfig;
 pub use world::World;
 pub use writer::{Summary, remove_dataset, write_dataset};

@@ -11,22 +11,20 @@ use std::{
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
 use gyre_geometry::{
     OwnedScan, ScanSlot,
-    samples::{RawFix, Sample},
+    samples::{Sample, SampleKind},
 };
 use gyre_radar::Trajectory;
 
 use crate::{
+    beside::{self, KINDS, Kind, Record},
     config::SimulationConfig,
     error::SimulatorError,
-    gnss,
-    gyro::log,
     layout::{self, radiate},
     objects,
     output::OutputFormat,
     profile::{Chirp, METADATA_BYTES},
     sensor::Sensor,
     simulator::Simulator,
-    wheels,
 };
 
 /// Images that are rendered ahead of the reader, which bounds the memory.
@@ -131,23 +129,15 @@ impl SimulatedDrive {
         text
     }
 
-    /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
-    /// `imu.csv` has them. `None` without a gyro.
-    pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        log::samples(&config.gyro, config.seed, path, self.simulator.span())
+    /// The samples of a sensor beside the radar, by their stamps, as its log has them. `None` if
+    /// the drive has no such sensor.
+    pub fn samples(&self, kind: SampleKind) -> Option<Vec<Sample>> {
+        beside::samples(kind, |row| self.records(row))
     }
 
-    /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
-    /// that measure.
-    pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
+    fn records(&self, kind: &Kind) -> Option<Vec<Record>> {
         let (config, path) = (self.simulator.config(), self.simulator.path());
-        wheels::samples(&config.wheels, config.seed, path, self.simulator.span())
-    }
-
-    fn fixes(&self) -> Option<Vec<RawFix>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        gnss::fixes(&config.gnss, config.seed, path, self.simulator.span())
+        kind.records(config, path, self.simulator.span())
     }
 
     pub(crate) fn side_files(&self) -> Vec<(&'static str, String)> {
@@ -170,19 +160,9 @@ impl SimulatedDrive {
         files.push(("ground_truth.tum", truth));
         let objects = objects::csv(simulator, &self.stamps_ns());
         files.push((objects::FILE, objects));
-        let logs = [
-            ("Navtech_Polar.txt", self.stamps()),
-            (log::FILE, self.gyro_samples().map(|it| log::csv(&it))),
-            (
-                wheels::FILE,
-                self.wheel_samples().map(|it| wheels::csv(&it)),
-            ),
-            (gnss::FILE, self.fixes().map(|it| gnss::csv(&it))),
-        ];
-        files.extend(
-            logs.into_iter()
-                .filter_map(|(name, log)| Some((name, log?))),
-        );
+        files.extend(self.stamps().map(|text| ("Navtech_Polar.txt", text)));
+        let log = |kind: &Kind| Some((kind.file, kind.csv(&self.records(kind)?)));
+        files.extend(KINDS.iter().filter_map(log));
         files
     }
 

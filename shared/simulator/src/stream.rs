@@ -43,9 +43,9 @@ impl Stream {
 }
 
 /// Episodes: what begins once in each so long time, at random, and lasts for a while.
-pub(crate) struct Episodes {
+pub struct Episodes {
     every_s: f64,
-    lasts_s: f64,
+    pub(crate) lasts_s: f64,
     rng: ChaCha8Rng,
     /// Number of those that were drawn, and the begin of the last one, s.
     drawn: i64,

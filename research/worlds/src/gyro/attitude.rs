@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Point2, UnitQuaternion, Vector2, Vector3};
 
+use super::MeanMotion;
 use crate::path::Path;
 use crate::relief::Relief;
 use crate::sensor::PitchRoll;
@@ -16,15 +17,6 @@ pub(crate) struct Vehicle<'a> {
     path: &'a dyn Path,
     relief: Relief,
     pitch_roll: Option<PitchRoll>,
-}
-
-/// The mean motion of the vehicle during a time, in its own axes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct MeanMotion {
-    /// Angular velocity, rad/s.
-    pub rates_radps: Vector3<f64>,
-    /// Acceleration as an accelerometer has it, with gravity: m/s².
-    pub acceleration_mps2: Vector3<f64>,
 }
 
 impl<'a> Vehicle<'a> {

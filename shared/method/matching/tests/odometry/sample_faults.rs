@@ -73,8 +73,8 @@ impl Drive {
             scans,
             dataset,
             config,
-            gyro: drive.gyro_samples().unwrap(),
-            wheels: drive.wheel_samples().unwrap(),
+            gyro: drive.samples(SampleKind::Gyro).unwrap(),
+            wheels: drive.samples(SampleKind::Wheels).unwrap(),
             folder: tempfile::tempdir().unwrap(),
         }
     }

@@ -1,10 +1,20 @@
-pub(crate) mod log;
-#[cfg(test)]
-mod tests;
-
+use nalgebra::{UnitQuaternion, Vector3};
+use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::{Device, Drift, Measure, normal, rounded};
+use crate::{
+    config::SimulationConfig,
+    path::Path,
+    stream::{Episodes, Stream},
+};
+
+/// Time between the stalls of the host and their duration, s; share of the samples that are lost.
+const FAULTS: [f64; 3] = [2.0, 0.06, 0.02];
+const GRAVITY_MPS2: f64 = 9.806_65;
+/// Steps of a log, of a rad/s and of a m/s².
+const LOG_STEPS: [f64; 2] = [1e9, 1e6];
 /// Degrees in radians.
 const DEG: f64 = std::f64::consts::PI / 180.0;
 const HOUR_S: f64 = 3600.0;
@@ -116,3 +126,84 @@ const EXACT: GyroFigures = GyroFigures {
     misalignment_rad: 0.0,
     step_radps: 0.0,
 };
+
+pub(super) fn device<'a>(config: &SimulationConfig, path: &'a dyn Path) -> Option<Device<'a>> {
+    let (gyro, seed) = (&config.gyro, config.seed);
+    let figures = gyro.profile.figures()?;
+    let [every_s, lasts_s, lost] = if gyro.faults { FAULTS } else { [0.0; 3] };
+    let mut errors = Stream::GYRO_ERRORS.generator(seed);
+    let measure = figures.measure(&mut errors, |span_s| MeanMotion::along(path, span_s));
+    let delay_s = gyro.delay_s;
+    Some(Device {
+        rate_hz: figures.rate_hz,
+        stamped_at: 0.5,
+        errors,
+        host: Some(Stream::GYRO_CLOCK.generator(seed)),
+        clock: Box::new(move |_, time_s| time_s + delay_s),
+        lost: Some(lost),
+        episodes: Episodes::new(every_s, lasts_s, Stream::GYRO_STALLS.generator(seed)),
+        stalls: true,
+        measure,
+    })
+}
+
+/// The mean motion of the vehicle during a time, in its own axes.
+#[derive(Clone, Copy, Debug)]
+pub struct MeanMotion {
+    pub rates_radps: Vector3<f64>,
+    /// Acceleration as an accelerometer has it, with gravity: m/s².
+    pub acceleration_mps2: Vector3<f64>,
+}
+
+impl MeanMotion {
+    /// The mean motion along a path from one time to another, s. The rate is what turns the heading
+    /// at the first into the one at the second, so that no rotation is lost.
+    fn along(path: &dyn Path, [from_s, to_s]: [f64; 2]) -> Self {
+        let duration_s = to_s - from_s;
+        let [before, after] = [from_s, to_s].map(|time_s| path.pose(time_s).rotation);
+        let turn_rad = before.rotation_to(&after).angle();
+        let change = (path.velocity(to_s) - path.velocity(from_s)) / duration_s;
+        let felt = path.pose(0.5 * (from_s + to_s)).rotation.inverse() * change;
+        Self {
+            rates_radps: Vector3::z() * (turn_rad / duration_s),
+            acceleration_mps2: Vector3::new(felt.x, felt.y, GRAVITY_MPS2),
+        }
+    }
+}
+
+impl GyroFigures {
+    /// Draws bias, scale and misalignment of a drive, and returns what measures a motion: rates,
+    /// then accelerations, in the gyro's axes, as a log writes them.
+    pub fn measure<'a>(
+        self,
+        rng: &mut ChaCha8Rng,
+        motion: impl Fn([f64; 2]) -> MeanMotion + 'a,
+    ) -> Measure<'a> {
+        let [bias, scale, askew] = [0; 3].map(|_| normal::<3>(rng));
+        let noise_radps = self.noise_rad_per_sqrt_s * self.rate_hz.sqrt();
+        // From the vehicle's axes to the axes of the gyro as mounted, up still up.
+        let mounting = UnitQuaternion::from_scaled_axis(askew * self.misalignment_rad);
+        let scale = Vector3::repeat(1.0) + scale * self.scale_sigma;
+        let bias_radps = bias * self.bias_sigma_radps;
+        let (sigma_radps, lasts_s) = (self.bias_drift_radps, self.bias_drift_s);
+        let mut drift = Drift::new(sigma_radps, lasts_s, self.rate_hz, Vector3::zeros());
+        Box::new(move |rng, span_s, _| {
+            let motion = motion(span_s);
+            let noise = normal::<3>(rng) * noise_radps;
+            let drift_radps = drift.value;
+            drift.step(rng);
+            let rates = (mounting * motion.rates_radps).component_mul(&scale);
+            let rates = rates + bias_radps + drift_radps + noise;
+            let rates = rates.map(|rate| rounded(rate, self.step_radps));
+            let accelerations = mounting * motion.acceleration_mps2;
+            let mut values = [0.0; 6];
+            for (kind, vector) in [rates, accelerations].into_iter().enumerate() {
+                let step = LOG_STEPS[kind];
+                // Adding zero turns a negative one into a positive one.
+                let logged = vector.map(|value| (value * step).round() / step + 0.0);
+                values[3 * kind..][..3].copy_from_slice(logged.as_slice());
+            }
+            Some(values)
+        })
+    }
+}
