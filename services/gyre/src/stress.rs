@@ -105,8 +105,11 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         first_ns: played.dataset.nominal_stamp_ns(turn.start),
         turn,
         others: Others {
-            gyro: odometry.gyro.is_used(),
-            wheels: odometry.wheels.is_used(),
+            used: [
+                odometry.gyro.is_used(),
+                odometry.wheels.is_used(),
+                odometry.doppler.is_used(),
+            ],
             are_weighed: odometry.refinement.kind != RefinementKind::None,
         },
         stages: stages.filter(|stage| configuration.has(*stage)).collect(),

@@ -1,11 +1,13 @@
 //! Results of the searches and of the refinement as the wire types of [`gyre_contract`].
 
 use gyre_contract::{
-    MotionEstimate, RefinementRecord, RotationEstimate, doppler, gyro, initial_guess, outcome,
-    wheels,
+    MotionEstimate, RefinementRecord, RotationEstimate, WitnessRecord, initial_guess, outcome,
+    verdict,
 };
 use gyre_geometry::{covariance, xy_yaw};
-use gyre_matching::{InitialGuess, MotionMatch, Outcome, Refined, RotationMatch, Verdict};
+use gyre_matching::{
+    InitialGuess, MotionMatch, Outcome, Refined, RotationMatch, Verdict, Witnessed,
+};
 
 pub fn rotation(found: &RotationMatch) -> RotationEstimate {
     let runner_up = found.runner_up;
@@ -81,29 +83,24 @@ fn record(refined: &Refined) -> RefinementRecord {
         overlap: refined.overlap,
         support: refined.support,
         stationary: refined.stationary.into(),
-        gyro: match refined.gyro.map(|of| of.verdict) {
-            None => gyro::NONE,
-            Some(Verdict::Agrees) => gyro::USED,
-            Some(Verdict::Doubted) => gyro::DOUBTED,
-            Some(Verdict::Refused) => gyro::REFUSED,
+        witnesses: [refined.gyro, refined.wheels, refined.doppler].map(witness),
+    }
+}
+
+fn witness(witnessed: Option<Witnessed>) -> WitnessRecord {
+    let Some(of) = witnessed else {
+        return WitnessRecord::default();
+    };
+    WitnessRecord {
+        verdict: match of.verdict {
+            Verdict::Agrees => verdict::USED,
+            Verdict::Doubted => verdict::DOUBTED,
+            Verdict::Refused => verdict::REFUSED,
         },
-        gyro_scale: refined.gyro.map_or(0.0, |of| of.scale),
-        gyro_bias_radps: refined.gyro.map_or(0.0, |bias| bias.rate_radps),
-        gyro_bias_sigma_radps: refined.gyro.map_or(0.0, |bias| bias.sigma_radps),
-        wheels: match refined.wheels {
-            None => wheels::NONE,
-            Some(of) if of.slip => wheels::SLIP,
-            Some(_) => wheels::USED,
-        },
-        wheel_scale: refined.wheels.map_or(0.0, |of| of.scale),
-        wheel_scale_sigma: refined.wheels.map_or(0.0, |of| of.sigma),
-        doppler: match refined.doppler {
-            None => doppler::NONE,
-            Some(of) if of.slip => doppler::REFUSED,
-            Some(_) => doppler::USED,
-        },
-        doppler_scale: refined.doppler.map_or(0.0, |of| of.scale),
-        doppler_scale_sigma: refined.doppler.map_or(0.0, |of| of.sigma),
-        ..RefinementRecord::default()
+        measured: of.measured,
+        scale: of.scale,
+        scale_sigma: of.scale_sigma,
+        bias: of.bias,
+        bias_sigma: of.bias_sigma,
     }
 }

@@ -79,11 +79,7 @@ impl Stage for RefinementStage {
                     &motion.motion().motion,
                     motion.interval_ns as f64 * 1e-9,
                 );
-                let mut motion = estimates::refined(&motion, &refined);
-                let (turn, distance) = (masked.turn(), masked.distance());
-                motion.refinement.gyro_turn_rad = turn.map_or(0.0, |it| it.yaw_rad);
-                motion.refinement.wheel_distance_m = distance.map_or(0.0, |it| it.distance_m);
-                motion
+                estimates::refined(&motion, &refined)
             }
             _ => motion,
         };

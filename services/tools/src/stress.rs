@@ -17,7 +17,7 @@ pub mod witness_fault;
 
 use std::{ops::Range, path::PathBuf, time::Duration};
 
-use gyre_contract::{StageId, run::Budget};
+use gyre_contract::{StageId, Witness, run::Budget};
 
 pub use campaign::{Options, stress};
 pub use gyre_contract::run::Scenario;
@@ -54,8 +54,8 @@ impl TestedPipeline {
 /// The sensors beside the radar that the run uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Others {
-    pub gyro: bool,
-    pub wheels: bool,
+    /// The kinds that are used, in the order of [`Witness::ALL`].
+    pub used: [bool; Witness::ALL.len()],
     /// True if they are weighed against the radar: there is a refinement.
     pub are_weighed: bool,
 }

@@ -1,6 +1,11 @@
 //! The basis of motions: the radar, other sensors, or a guess; and how often the others were used.
 
-use crate::refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
+use serde::{Serialize, Serializer, ser::SerializeMap};
+
+use crate::{
+    refinement::{RefinementRecord, initial_guess, outcome, verdict},
+    witness::Witness,
+};
 
 crate::named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,12 +40,8 @@ impl Basis {
 }
 
 impl RefinementRecord {
-    pub fn uses_gyro(&self) -> bool {
-        [gyro::USED, gyro::DOUBTED].contains(&self.gyro)
-    }
-
     pub fn basis(&self) -> Basis {
-        let by_distance = self.wheels == wheels::USED || self.doppler == doppler::USED;
+        let by_distance = self.distance_by().is_some();
         match self.outcome {
             outcome::SEARCHED => Basis::ScanToScan,
             outcome::PREDICTED if by_distance => Basis::DeadReckoning,
@@ -49,33 +50,41 @@ impl RefinementRecord {
                 true => Basis::AlongWalls,
                 false => Basis::WayGuessed,
             },
-            _ if by_distance || self.uses_gyro() => Basis::RadarAndOthers,
+            _ if self.witnesses.iter().any(|it| it.is_used()) => Basis::RadarAndOthers,
             _ => Basis::RadarOnly,
         }
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WitnessCounts {
     /// In the order of [`Basis::ALL`].
     pub by_basis: [u64; Basis::ALL.len()],
-    pub gyro_used: u64,
-    pub gyro_refused: u64,
-    pub wheels_used: u64,
-    pub wheel_slips: u64,
-    pub doppler_used: u64,
-    pub doppler_refused: u64,
+    /// Motions that use each kind, and that do not use its measurement.
+    pub used: [u64; Witness::ALL.len()],
+    pub refused: [u64; Witness::ALL.len()],
+}
+
+impl Serialize for WitnessCounts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("by_basis", &self.by_basis)?;
+        for kind in Witness::ALL {
+            let [used, refused] = kind.row().keys;
+            map.serialize_entry(used, &self.used[kind as usize])?;
+            map.serialize_entry(refused, &self.refused[kind as usize])?;
+        }
+        map.end()
+    }
 }
 
 impl WitnessCounts {
     pub fn add(&mut self, motion: &RefinementRecord) {
         self.by_basis[motion.basis() as usize] += 1;
-        self.gyro_used += u64::from(motion.uses_gyro());
-        self.gyro_refused += u64::from(motion.gyro == gyro::REFUSED);
-        self.wheels_used += u64::from(motion.wheels == wheels::USED);
-        self.wheel_slips += u64::from(motion.wheels == wheels::SLIP);
-        self.doppler_used += u64::from(motion.doppler == doppler::USED);
-        self.doppler_refused += u64::from(motion.doppler == doppler::REFUSED);
+        for (kind, of) in motion.witnesses.iter().enumerate() {
+            self.used[kind] += u64::from(of.is_used());
+            self.refused[kind] += u64::from(of.verdict == verdict::REFUSED);
+        }
     }
 
     pub fn of<'a>(motions: impl IntoIterator<Item = &'a RefinementRecord>) -> Self {
@@ -100,21 +109,17 @@ impl WitnessCounts {
     /// Returns the part of gyro, wheels and Doppler in words, as `gyro 98 %, 1 refused, wheels 100
     /// %`; `None` without any measurement.
     pub fn in_words(&self) -> Option<String> {
-        let of = |name, used: u64, (not, count): (&str, u64)| {
+        let words = Witness::ALL.into_iter().filter_map(|kind| {
+            let (used, refused) = (self.used[kind as usize], self.refused[kind as usize]);
             let share = 100.0 * used as f64 / self.motions().max(1) as f64;
-            let not = match count {
+            let (name, [_, refusals]) = (kind.row().word, kind.row().refused);
+            let not = match refused {
                 0 => String::new(),
-                _ => format!(", {count} {not}"),
+                _ => format!(", {refused} {refusals}"),
             };
-            (used + count > 0).then(|| format!("{name} {share:.0} %{not}"))
-        };
-        let doppler_refused = ("refused", self.doppler_refused);
-        let words = [
-            of("gyro", self.gyro_used, ("refused", self.gyro_refused)),
-            of("wheels", self.wheels_used, ("slips", self.wheel_slips)),
-            of("Doppler", self.doppler_used, doppler_refused),
-        ];
-        let words: Vec<String> = words.into_iter().flatten().collect();
+            (used + refused > 0).then(|| format!("{name} {share:.0} %{not}"))
+        });
+        let words: Vec<String> = words.collect();
         (!words.is_empty()).then(|| words.join(", "))
     }
 }
@@ -126,34 +131,38 @@ mod tests {
     #[test]
     fn each_state_has_its_name_and_the_sensors_that_were_used_are_counted() {
         let of = |[outcome, initial_guess]: [u32; 2]| {
-            move |gyro, wheels, doppler| RefinementRecord {
-                outcome,
-                initial_guess,
-                gyro,
-                wheels,
-                doppler,
-                ..RefinementRecord::default()
+            move |verdicts: [u64; 3]| {
+                let mut record = RefinementRecord {
+                    outcome,
+                    initial_guess,
+                    ..RefinementRecord::default()
+                };
+                for (of, verdict) in record.witnesses.iter_mut().zip(verdicts) {
+                    of.verdict = verdict;
+                }
+                record
             }
         };
+        let [no, used, refused] = [verdict::NONE, verdict::USED, verdict::REFUSED];
         let counted = |cases: &[(RefinementRecord, &str)]| {
             for (motion, name) in cases {
                 assert_eq!(motion.basis().name(), *name, "{motion:?}");
             }
             WitnessCounts::of(cases.iter().map(|(motion, _)| motion))
         };
-        let refined = of([outcome::REFINED, initial_guess::PREDICTION]);
+        let by_match = of([outcome::REFINED, initial_guess::PREDICTION]);
         let walls = of([outcome::REFINED, initial_guess::ALONG_WALLS]);
         let predicted = of([outcome::PREDICTED, initial_guess::PREDICTION]);
         let counts = counted(&[
-            (of([0, 0])(0, 0, 0), "scan to scan"),
-            (refined(0, 0, 0), "radar only"),
-            (refined(gyro::REFUSED, wheels::SLIP, 0), "radar only"),
-            (refined(gyro::USED, wheels::SLIP, 0), "radar and others"),
-            (refined(gyro::REFUSED, wheels::USED, 0), "radar and others"),
-            (walls(gyro::USED, wheels::USED, 0), "along walls"),
-            (walls(gyro::USED, 0, 0), "way guessed"),
-            (predicted(0, wheels::USED, 0), "dead reckoning"),
-            (predicted(gyro::USED, wheels::SLIP, 0), "guessed"),
+            (of([0, 0])([no; 3]), "scan to scan"),
+            (by_match([no, no, no]), "radar only"),
+            (by_match([refused, refused, no]), "radar only"),
+            (by_match([used, refused, no]), "radar and others"),
+            (by_match([refused, used, no]), "radar and others"),
+            (walls([used, used, no]), "along walls"),
+            (walls([used, no, no]), "way guessed"),
+            (predicted([no, used, no]), "dead reckoning"),
+            (predicted([used, refused, no]), "guessed"),
         ]);
         assert_eq!(counts.by_basis, [1, 2, 2, 1, 1, 1, 1]);
         assert_eq!(counts.motions(), 9);
@@ -162,15 +171,18 @@ mod tests {
         let words = "gyro 44 %, 2 refused, wheels 33 %, 3 slips";
         assert_eq!(counts.in_words().as_deref(), Some(words));
         let counts = counted(&[
-            (refined(0, 0, doppler::USED), "radar and others"),
-            (refined(0, 0, doppler::REFUSED), "radar only"),
-            (walls(0, 0, doppler::USED), "along walls"),
-            (walls(0, 0, doppler::REFUSED), "way guessed"),
-            (predicted(0, 0, doppler::USED), "dead reckoning"),
+            (by_match([no, no, used]), "radar and others"),
+            (by_match([no, no, refused]), "radar only"),
+            (walls([no, no, used]), "along walls"),
+            (walls([no, no, refused]), "way guessed"),
+            (predicted([no, no, used]), "dead reckoning"),
         ]);
         let words = "Doppler 60 %, 2 refused";
         assert_eq!(counts.in_words().as_deref(), Some(words));
-        let counts = counted(&[(refined(0, 0, 0), "radar only")]);
+        let json = serde_json::to_string(&counts).unwrap_or_default();
+        let keys = r#""gyro_used":0,"gyro_refused":0,"wheels_used":0,"wheel_slips":0,"doppler_used":3,"doppler_refused":2}"#;
+        assert_eq!(json, format!(r#"{{"by_basis":[0,1,1,1,1,1,0],{keys}"#));
+        let counts = counted(&[(by_match([no, no, no]), "radar only")]);
         assert_eq!(counts.in_words(), None);
     }
 }

@@ -24,6 +24,7 @@ mod scan;
 mod stages;
 mod topics;
 pub mod wire;
+mod witness;
 
 pub use basis::{Basis, WitnessCounts};
 pub use follower::{CorrectionHeader, FixHeader, LoopHeader, fix_status};
@@ -35,7 +36,7 @@ pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender, Topic
 pub use motion::{MotionEstimate, MotionHeader, RotationEstimate, RotationHeader};
 pub use object::{Drawing, MAX_LISTED, Object, ObjectsHeader};
 pub use pose::{PoseHeader, compose};
-pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
+pub use refinement::{RefinementRecord, WitnessRecord, initial_guess, outcome, verdict};
 pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::ScanHeader;
 pub use stages::{StageTopics, composed};
@@ -43,3 +44,4 @@ pub use topics::{
     Correction, Fix, Footprint, GivenAnew, Intake, Loop, Masked, Motion, NumberedBy, Objects, Pose,
     Refined, Rotation, Scan, all, named as topic_named, topic, topics,
 };
+pub use witness::{Measures, Witness};

@@ -1,6 +1,9 @@
 //! The record of a refinement in the messages that carry a motion.
 
-use crate::wire::{Bounds, codes, wire};
+use crate::{
+    wire::{Bounds, codes, wire},
+    witness::{Measures, Witness},
+};
 
 codes! {
     pub mod outcome: u32 {
@@ -25,40 +28,38 @@ codes! {
         ALONG_WALLS = "along-walls",
     }
 
-    pub mod gyro: u64 {
-        /// It has not measured the turn.
+    /// What became of the measurement of a sensor beside the radar.
+    pub mod verdict: u64 {
+        /// It has not measured the motion.
         NONE = "none",
-        /// It agrees with the registered motion, or the motion is predicted with its turn.
+        /// It agrees with the registered motion, or the motion is predicted by it.
         USED = "used",
         /// It contradicts the registered motion, or has contradicted the last one: it is not used.
+        /// Wheels slip.
         REFUSED = "refused",
         /// It differs by more than noise from the registered motion, but not by more than a match
         /// can err: both are weighed all the same.
         DOUBTED = "doubted",
     }
-
-    pub mod wheels: u64 {
-        /// They have not measured the distance.
-        NONE = "none",
-        /// They agree with the registered motion, or the motion is predicted by them.
-        USED = "used",
-        /// They slip: they disagree with the registered motion, or with the last one.
-        SLIP = "slip",
-    }
-
-    pub mod doppler: u64 {
-        /// One of both scans does not determine its velocity.
-        NONE = "none",
-        /// It agrees with the registered motion, or the motion is predicted by it.
-        USED = "used",
-        /// It contradicts the registered motion, or has contradicted the last one: it is not used.
-        REFUSED = "refused",
-    }
 }
 
 wire! {
+    /// A sensor beside the radar in a motion; all zero if it has not measured the motion.
+    pub struct WitnessRecord = "gyre_witness_record_v1" {
+        /// See [`verdict`].
+        pub verdict: u64 [Bounds::Codes(verdict::NAMES)],
+        /// The turn (rad) or the distance (m) since the previous scan that it measured.
+        pub measured: f64 [Bounds::Finite],
+        /// The true value over the measured one, after the scan.
+        pub scale: f64 [Bounds::Finite],
+        pub scale_sigma: f64 [Bounds::Finite],
+        /// Bias after the scan, rad/s; zero of a sensor of the distance.
+        pub bias: f64 [Bounds::Finite],
+        pub bias_sigma: f64 [Bounds::Finite],
+    }
+
     /// The result of a refinement; all zero without one.
-    pub struct RefinementRecord = "gyre_refinement_v6" {
+    pub struct RefinementRecord = "gyre_refinement_v7" {
         /// See [`outcome`].
         pub outcome: u32 [Bounds::Codes(outcome::NAMES)],
         /// The initial guess of the accepted motion: see [`initial_guess`].
@@ -70,24 +71,8 @@ wire! {
         pub support: f64 [Bounds::Finite],
         /// 1 while the vehicle stands, and its pose is held: the motion is zero. Otherwise 0.
         pub stationary: u64 [Bounds::Codes(NO_YES)],
-        pub gyro: u64 [Bounds::Codes(gyro::NAMES)],
-        /// Turn since the previous scan that the gyro measured, rad; zero without one.
-        pub gyro_turn_rad: f64 [Bounds::Finite],
-        /// Scale of the gyro (true turn over measured turn) after the scan; zero without a gyro.
-        pub gyro_scale: f64 [Bounds::Finite],
-        /// Bias of the gyro after the scan, rad/s; zero without one.
-        pub gyro_bias_radps: f64 [Bounds::Finite],
-        pub gyro_bias_sigma_radps: f64 [Bounds::Finite],
-        pub wheels: u64 [Bounds::Codes(wheels::NAMES)],
-        /// Distance since the previous scan that the wheels measured, m; zero without wheels.
-        pub wheel_distance_m: f64 [Bounds::Finite],
-        /// True distance over the wheels' distance, after the scan; zero without wheels.
-        pub wheel_scale: f64 [Bounds::Finite],
-        pub wheel_scale_sigma: f64 [Bounds::Finite],
-        pub doppler: u64 [Bounds::Codes(doppler::NAMES)],
-        /// True velocity over that by Doppler, after the scan; zero without one.
-        pub doppler_scale: f64 [Bounds::Finite],
-        pub doppler_scale_sigma: f64 [Bounds::Finite],
+        /// Gyro, wheels and Doppler.
+        pub witnesses: [WitnessRecord; Witness::ALL.len()],
     }
 }
 
@@ -97,5 +82,30 @@ pub(crate) const NO_YES: &[&str] = &["no", "yes"];
 impl RefinementRecord {
     pub fn is_stationary(&self) -> bool {
         self.stationary != 0
+    }
+
+    pub fn of(&self, kind: Witness) -> &WitnessRecord {
+        &self.witnesses[kind as usize]
+    }
+
+    pub fn of_mut(&mut self, kind: Witness) -> &mut WitnessRecord {
+        &mut self.witnesses[kind as usize]
+    }
+
+    /// Returns the kind whose distance the motion uses.
+    pub fn distance_by(&self) -> Option<Witness> {
+        let mut kinds = Witness::ALL.into_iter();
+        kinds.find(|it| it.row().measures == Measures::Distance && self.of(*it).is_used())
+    }
+}
+
+impl WitnessRecord {
+    pub fn is_used(&self) -> bool {
+        [verdict::USED, verdict::DOUBTED].contains(&self.verdict)
+    }
+
+    /// Returns what it measured; `None` if it has not measured the motion.
+    pub fn measured(&self) -> Option<f64> {
+        (self.verdict != verdict::NONE).then_some(self.measured)
     }
 }

@@ -3,32 +3,48 @@
 use std::collections::VecDeque;
 
 use gyre_geometry::samples::{Sample, SampleKind};
+use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use crate::scan::ScanHeader;
+use crate::{scan::ScanHeader, witness::Witness};
 
 /// Scans for measuring rates: ten seconds at 4 Hz.
 const SCANS: usize = 41;
-const KINDS: [SampleKind; 2] = [SampleKind::Gyro, SampleKind::Wheels];
+const KINDS: usize = Witness::ALL.len();
 
 #[derive(Clone, Debug, Default)]
 pub struct SampleRates {
     /// The end of each of the last scans, ns, with the new samples of each kind.
-    scans: VecDeque<(i64, [u64; 2])>,
+    scans: VecDeque<(i64, [u64; KINDS])>,
     /// The newest stamp of each kind: samples come with two scans.
-    newest_ns: [Option<i64>; 2],
-    counts: [u64; 2],
+    newest_ns: [Option<i64>; KINDS],
+    counts: [u64; KINDS],
     left_out: u64,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleHealth {
-    pub gyro: u64,
-    pub wheels: u64,
+    /// Samples of each kind, in the order of [`Witness::ALL`].
+    pub counts: [u64; KINDS],
     /// Samples that were left out, since they came late or were unusable.
     pub left_out: u64,
-    /// Samples of the gyro a second by the stamps of the last scans; `None` without samples so far.
-    pub gyro_hz: Option<f64>,
-    pub wheels_hz: Option<f64>,
+    /// Samples of each kind a second by the stamps of the last scans; `None` without samples so
+    /// far.
+    pub rates_hz: [Option<f64>; KINDS],
+}
+
+impl Serialize for SampleHealth {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for (kind, _) in Witness::sampled() {
+            map.serialize_entry(kind.name(), &self.counts[kind as usize])?;
+        }
+        map.serialize_entry("left_out", &self.left_out)?;
+        for (kind, _) in Witness::sampled() {
+            let key = format!("{}_hz", kind.name());
+            map.serialize_entry(&key, &self.rates_hz[kind as usize])?;
+        }
+        map.end()
+    }
 }
 
 impl SampleRates {
@@ -39,7 +55,10 @@ impl SampleRates {
             return;
         }
         let samples = header.samples(bytes).unwrap_or_default();
-        let new = [0, 1].map(|kind| self.count(kind, samples));
+        let mut new = [0; KINDS];
+        for (kind, of) in Witness::sampled() {
+            new[kind as usize] = self.count(kind as usize, of, samples);
+        }
         self.left_out += u64::from(header.samples_left_out);
         self.scans.push_back((end_ns, new));
         if self.scans.len() > SCANS {
@@ -48,9 +67,9 @@ impl SampleRates {
     }
 
     /// Counts the samples of a kind that no scan before had.
-    fn count(&mut self, kind: usize, samples: &[Sample]) -> u64 {
+    fn count(&mut self, kind: usize, of: SampleKind, samples: &[Sample]) -> u64 {
         let newest_ns = self.newest_ns[kind];
-        let mut of_kind = samples.iter().filter(|sample| sample.is(KINDS[kind]));
+        let mut of_kind = samples.iter().filter(|sample| sample.is(of));
         let is_new = |sample: &&Sample| newest_ns.is_none_or(|ns| sample.stamp_ns > ns);
         let new = of_kind.clone().filter(is_new).count() as u64;
         let last_ns = of_kind.next_back().map(|sample| sample.stamp_ns);
@@ -60,13 +79,10 @@ impl SampleRates {
     }
 
     pub fn health(&self) -> SampleHealth {
-        let rates = [0, 1].map(|kind| self.rate_hz(kind));
         SampleHealth {
-            gyro: self.counts[0],
-            wheels: self.counts[1],
+            counts: self.counts,
             left_out: self.left_out,
-            gyro_hz: rates[0],
-            wheels_hz: rates[1],
+            rates_hz: std::array::from_fn(|kind| self.rate_hz(kind)),
         }
     }
 
@@ -83,15 +99,13 @@ impl SampleHealth {
     /// Returns it in words, as `gyro 208 Hz, wheels 50 Hz, 3 samples left out`; `None` without
     /// samples.
     pub fn in_words(&self) -> Option<String> {
-        let of = |name: &str, rate: Option<f64>| rate.map(|hz| format!("{name} {hz:.0} Hz"));
+        let rates = Witness::sampled().filter_map(|(kind, _)| {
+            let hz = self.rates_hz[kind as usize]?;
+            Some(format!("{} {hz:.0} Hz", kind.row().word))
+        });
         let left_out = self.left_out;
         let left_out = (left_out > 0).then(|| format!("{left_out} samples left out"));
-        let words = [
-            of("gyro", self.gyro_hz),
-            of("wheels", self.wheels_hz),
-            left_out,
-        ];
-        let words: Vec<String> = words.into_iter().flatten().collect();
+        let words: Vec<String> = rates.chain(left_out).collect();
         (!words.is_empty()).then(|| words.join(", "))
     }
 }
@@ -143,18 +157,21 @@ mod tests {
             add(&mut rates, scan, i64::MAX / MS);
         }
         let health = rates.health();
-        assert_eq!(
-            (health.gyro_hz, health.wheels_hz),
-            (Some(100.0), Some(20.0))
-        );
+        assert_eq!(health.rates_hz, [Some(100.0), Some(20.0), None]);
         let words = "gyro 100 Hz, wheels 20 Hz, 1 samples left out";
         assert_eq!(health.in_words().as_deref(), Some(words));
         for scan in 41..=100 {
             add(&mut rates, scan, 10_250);
         }
         let health = rates.health();
-        assert_eq!((health.gyro_hz, health.wheels_hz), (Some(0.0), Some(20.0)));
+        assert_eq!(health.rates_hz, [Some(0.0), Some(20.0), None]);
         // From 1 ms to 10.249 s, and to 25.249 s.
-        assert_eq!((health.gyro, health.wheels), (1024, 504));
+        assert_eq!(health.counts, [1024, 504, 0]);
+        let json = serde_json::to_value(health).unwrap_or_default();
+        let expected = serde_json::json!({
+            "gyro": 1024, "wheels": 504, "left_out": health.left_out,
+            "gyro_hz": 0.0, "wheels_hz": 20.0,
+        });
+        assert_eq!(json, expected);
     }
 }

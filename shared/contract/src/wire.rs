@@ -142,7 +142,7 @@ impl Field {
                 .check(content, limits)
                 .map_err(|violation| format!(".{violation}")),
             Kind::Array(element, length) => match self.bounds {
-                Bounds::Any => Ok(()),
+                Bounds::Any if !matches!(element, Kind::Structure(_)) => Ok(()),
                 whole if whole.is_of_all() => whole.check_all(content, limits),
                 bounds => {
                     let count = of.counted(self, bytes, length);

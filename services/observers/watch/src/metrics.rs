@@ -9,7 +9,7 @@ use prometheus_client::{
     registry::{Registry, Unit},
 };
 
-use gyre_contract::Basis;
+use gyre_contract::{Basis, Witness};
 
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
@@ -102,6 +102,11 @@ impl Snapshot {
         let (counts, of, missed) = (&self.counts, &self.counts.witnesses, &self.counts.missed);
         let by_basis = Basis::ALL.iter().zip(of.by_basis);
         let by_basis = by_basis.map(|(basis, count)| (basis.name(), count as f64));
+        let by_kind = Witness::ALL.map(|kind| {
+            let ([name, help], [refused, _]) = (kind.row().metric, kind.row().refused);
+            let states = [("used", of.used[kind as usize]), (refused, of.refused[kind as usize])];
+            (name, help, None, COUNTER, by("state", states))
+        });
         let mut metrics = vec![
             ("scans_published", "Scans that the source has published.", None, COUNTER, one(counts.published)),
             ("poses", "Poses of the trajectory.", None, COUNTER, one(counts.poses)),
@@ -109,22 +114,26 @@ impl Snapshot {
             ("up", "1 while a run works, else 0.", None, GAUGE, one(self.is_up.into())),
             ("scans_in_flight", "Scans that were published and have no pose yet.", None, GAUGE, one(counts.in_flight)),
             ("motions", "Motions by what they rest on.", None, COUNTER, Values::By("basis", by_basis.collect())),
-            ("gyro_turns", "Turns that the gyro has measured: used, or refused since the radar contradicts.", None, COUNTER, by("state", [("used", of.gyro_used), ("refused", of.gyro_refused)])),
-            ("wheel_distances", "Distances that the wheels have measured: used, or slipping.", None, COUNTER, by("state", [("used", of.wheels_used), ("slip", of.wheel_slips)])),
-            ("doppler_velocities", "Velocities by Doppler: used, or refused since the matches contradict.", None, COUNTER, by("state", [("used", of.doppler_used), ("refused", of.doppler_refused)])),
+        ];
+        metrics.extend(by_kind);
+        metrics.extend([
             ("observer_missed", "Messages that this observer has missed. Delays lack those of missed poses.", None, COUNTER, by("topic", [("pose", missed.pose), ("scan", missed.scan), ("masked", missed.masked), ("objects", missed.objects)])),
             ("process_restarts", "Restarts of a process of the run.", None, COUNTER, self.by_process(|it| Some(it.restarts as f64))),
             ("process_cpu", "Processor time of a process since its start.", Some(Unit::Seconds), COUNTER, self.by_process(|it| it.cpu_s)),
             ("process_memory", "Memory of a process's own.", Some(Unit::Bytes), GAUGE, self.by_process(|it| it.own_bytes.map(|bytes| bytes as f64))),
-        ];
+        ]);
         let samples = &counts.samples;
-        if samples.gyro_hz.is_some() || samples.wheels_hz.is_some() {
-            let rates = [("gyro", samples.gyro_hz), ("wheels", samples.wheels_hz)];
-            let rates = rates.map(|(sensor, rate_hz)| (sensor, rate_hz.unwrap_or(0.0))).to_vec();
+        if samples.rates_hz.iter().any(Option::is_some) {
+            let by_sensor = |of: &dyn Fn(usize) -> f64| {
+                let values = Witness::sampled().map(|(kind, _)| (kind.name(), of(kind as usize)));
+                Values::By("sensor", values.collect())
+            };
+            let counts = by_sensor(&|kind| samples.counts[kind] as f64);
+            let rates = by_sensor(&|kind| samples.rates_hz[kind].unwrap_or(0.0));
             metrics.extend([
-                ("samples", "Samples that came with the scans.", None, COUNTER, by("sensor", [("gyro", samples.gyro), ("wheels", samples.wheels)])),
+                ("samples", "Samples that came with the scans.", None, COUNTER, counts),
                 ("samples_left_out", "Samples that were left out, since they came late or were unusable.", None, COUNTER, one(samples.left_out)),
-                ("sample_rate", "Samples a second by their stamps, over the last scans.", Some(Unit::Other("hertz".to_owned())), GAUGE, Values::By("sensor", rates)),
+                ("sample_rate", "Samples a second by their stamps, over the last scans.", Some(Unit::Other("hertz".to_owned())), GAUGE, rates),
             ]);
         }
         if let Some(it) = self.processes.iter().find_map(|it| it.received) {
@@ -150,7 +159,7 @@ impl Snapshot {
 #[cfg(test)]
 mod tests {
     use gyre_contract::{
-        Hop, Item, PoseHeader, StageId, control::Received, flag, gyro, outcome, wheels,
+        Hop, Item, PoseHeader, StageId, control::Received, flag, outcome, verdict,
     };
 
     use super::*;
@@ -187,7 +196,7 @@ mod tests {
 
     /// The text of a run with a live radar and a gyro.
     fn of_sensors(mut counts: RunCounts, received: Received) -> String {
-        counts.samples.gyro_hz = Some(208.0);
+        counts.samples.rates_hz[Witness::Gyro as usize] = Some(208.0);
         let source = Process {
             name: "radar-replay".to_owned(),
             received: Some(received),
@@ -229,8 +238,9 @@ mod tests {
         let view = view();
         let mut pose = PoseHeader::default();
         let record = &mut pose.motion.refinement;
-        (record.outcome, record.gyro, record.wheels) =
-            (outcome::PREDICTED, gyro::REFUSED, wheels::USED);
+        record.outcome = outcome::PREDICTED;
+        record.of_mut(Witness::Gyro).verdict = verdict::REFUSED;
+        record.of_mut(Witness::Wheels).verdict = verdict::USED;
         view.add_to_track(&pose);
         // The first pose of a chain has no motion.
         pose.item.flags = flag::BREAK;
@@ -245,7 +255,8 @@ mod tests {
             ..Received::default()
         };
         let mut counts = view.counts();
-        (counts.samples.gyro, counts.samples.left_out) = (2080, 3);
+        counts.samples.counts[Witness::Gyro as usize] = 2080;
+        counts.samples.left_out = 3;
         let text = of_sensors(counts, received);
         for line in [
             "gyre_motions_total{basis=\"dead reckoning\"} 1.0",

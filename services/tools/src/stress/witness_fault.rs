@@ -1,9 +1,9 @@
 //! Faults of gyro, wheels and radar: the source plays them, and the motions must report them.
 
 use gyre_contract::{
-    Basis, PoseHeader, RefinementRecord, StageId, WitnessCounts, flag,
+    Basis, PoseHeader, RefinementRecord, StageId, Witness, WitnessCounts, flag,
     run::{PlayedFault, PlayedFaultKind, Scenario},
-    wheels,
+    verdict,
 };
 use serde::Serialize;
 
@@ -44,18 +44,25 @@ pub fn needed_s(faults: &[PlayedFault]) -> f64 {
     faults.last().map_or(0.0, |last| last.ends_s() + AFTER_S)
 }
 
+/// Returns the sensors that a fault concerns, of which a run needs one, and what a run without them
+/// lacks.
+fn concerned(kind: PlayedFaultKind) -> (&'static [Witness], &'static str) {
+    match kind {
+        PlayedFaultKind::GyroOut => (&[Witness::Gyro], "a gyro, and gyro.kind is none"),
+        PlayedFaultKind::WheelsSlip => (&[Witness::Wheels], "wheels, and wheels.kind is none"),
+        PlayedFaultKind::ClockJump | PlayedFaultKind::RadarBlind => (
+            &[Witness::Gyro, Witness::Wheels],
+            "a gyro or wheels, and gyro.kind and wheels.kind are none",
+        ),
+    }
+}
+
 /// Returns the reason why a scenario cannot be carried out with a pipeline.
 pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
     let faults = faults(scenario);
-    let kind = faults.first()?.kind;
+    let (kinds, lacking) = concerned(faults.first()?.kind);
     let others = &tested.others;
-    let lacking = match (others.gyro, others.wheels) {
-        (false, _) if kind == PlayedFaultKind::GyroOut => "a gyro, and gyro.kind is none",
-        (_, false) if kind == PlayedFaultKind::WheelsSlip => "wheels, and wheels.kind is none",
-        (false, false) => "a gyro or wheels, and gyro.kind and wheels.kind are none",
-        _ => "",
-    };
-    if !lacking.is_empty() {
+    if !kinds.iter().any(|kind| others.used[*kind as usize]) {
         return Some(format!(
             "{scenario} needs {lacking}: play a recording with its logs beside the scans and set gyro.kind=auto or wheels.kind=auto, or a simulation with simulation.gyro.profile and simulation.wheels.rate_hz"
         ));
@@ -228,31 +235,24 @@ impl WitnessFaults {
     }
 }
 
-/// Returns whether a motion is by the gyro and by the wheels, as far as the run uses them.
-fn agrees(others: Others, motion: &RefinementRecord) -> [bool; 2] {
-    let gyro = !others.gyro || motion.uses_gyro();
-    [gyro, !others.wheels || motion.wheels == wheels::USED]
-}
-
+/// Returns whether a motion is by all sensors that a fault concerns, as far as the run uses them.
 fn is_normal(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -> bool {
-    let [gyro, by_wheels] = agrees(others, motion);
+    let is_by = |it: &Witness| !others.used[*it as usize] || motion.of(*it).is_used();
     match kind {
-        PlayedFaultKind::GyroOut => gyro,
-        PlayedFaultKind::WheelsSlip => by_wheels,
-        PlayedFaultKind::ClockJump => gyro && by_wheels,
         PlayedFaultKind::RadarBlind => {
             matches!(motion.basis(), Basis::RadarOnly | Basis::RadarAndOthers)
         }
+        kind => concerned(kind).0.iter().all(is_by),
     }
 }
 
+/// Returns whether a motion is without each sensor that a fault concerns and the run uses.
 fn is_noticed(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -> bool {
-    let [gyro, by_wheels] = agrees(others, motion);
+    let is_without = |it: &Witness| !others.used[*it as usize] || !motion.of(*it).is_used();
     match kind {
-        PlayedFaultKind::GyroOut => !motion.uses_gyro(),
-        PlayedFaultKind::WheelsSlip => motion.wheels == wheels::SLIP,
-        PlayedFaultKind::ClockJump => (!others.gyro || !gyro) && (!others.wheels || !by_wheels),
         PlayedFaultKind::RadarBlind => motion.basis().is_degraded(),
+        PlayedFaultKind::WheelsSlip => motion.of(Witness::Wheels).verdict == verdict::REFUSED,
+        kind => concerned(kind).0.iter().all(is_without),
     }
 }
 

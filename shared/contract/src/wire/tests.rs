@@ -75,6 +75,8 @@ fn a_header_is_finite_and_within_its_bounds() {
         "motion.rotation.angle_rad is 9": |it| it.motion.rotation.angle_rad = 9.0,
         "motion.refinement.outcome is 4": |it| it.motion.refinement.outcome = 4,
         "motion.refinement.overlap is NaN": |it| it.motion.refinement.overlap = f64::NAN,
+        "motion.refinement.witnesses[1].verdict is 4": |it| it.motion.refinement.witnesses[1].verdict = 4,
+        "motion.refinement.witnesses[2].scale is NaN": |it| it.motion.refinement.witnesses[2].scale = f64::NAN,
     }
     refused! { Pose, PoseHeader::default(), &[];
         "x_m is NaN": |it| it.x_m = f64::NAN,

@@ -30,14 +30,14 @@ use gyre_geometry::{
         WheelsConfig,
     },
 };
-pub use heading::{GyroBias, Heading, Verdict};
+pub use heading::{Heading, Verdict};
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
 use nalgebra::{Matrix3, UnitVector2, Vector2};
 pub use standstill::Standstill;
 pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
-pub use wheels::{WheelScale, WheelState};
+pub use wheels::WheelState;
 
 use crate::SettingError;
 use alignment::Alignment;
@@ -80,9 +80,24 @@ pub struct Refined {
     /// The initial guess of the accepted match; the prediction without a match.
     pub guess: InitialGuess,
     pub stationary: bool,
-    pub gyro: Option<GyroBias>,
-    pub wheels: Option<WheelScale>,
-    pub doppler: Option<WheelScale>,
+    /// The sensors that have measured the motion.
+    pub gyro: Option<Witnessed>,
+    pub wheels: Option<Witnessed>,
+    pub doppler: Option<Witnessed>,
+}
+
+/// A sensor beside the radar in a motion, and its errors after the scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Witnessed {
+    pub verdict: Verdict,
+    /// The turn (rad) or the distance (m) that it measured.
+    pub measured: f64,
+    /// True value over the measured one.
+    pub scale: f64,
+    pub scale_sigma: f64,
+    /// Bias, rad/s; zero of a sensor of the distance.
+    pub bias: f64,
+    pub bias_sigma: f64,
 }
 
 struct Accepted {
@@ -188,9 +203,9 @@ impl Refiner {
             Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
         let accepted = self.accept_or_predict(&scan, &mut best, &uncertainty);
         let outcome = accepted.outcome;
-        let gyro = self.aiding.turn.and(self.state.heading);
-        let wheels = self.aiding.distance.and(self.state.wheels);
-        let doppler = self.displacement.and(self.state.doppler);
+        let by_gyro = self.aiding.turn.zip(self.state.heading);
+        let by_wheels = self.aiding.distance.zip(self.state.wheels);
+        let by_doppler = self.displacement.zip(self.state.doppler);
         let mut report = self.hold_standstill(&scan, &accepted);
         if let (false, Some(heading)) = (report.stationary, &mut self.state.heading) {
             report.motion.motion = heading.correct(&report.motion.motion);
@@ -208,9 +223,9 @@ impl Refiner {
             guess: accepted.guess,
             outcome,
             stationary: report.stationary,
-            gyro: gyro.map(|it| it.bias()),
-            wheels: wheels.map(|it| it.estimate()),
-            doppler: doppler.map(|it| it.estimate()),
+            gyro: by_gyro.map(|(turn, it)| it.witnessed(turn.yaw_rad)),
+            wheels: by_wheels.map(|(measured, it)| it.witnessed(measured.distance_m)),
+            doppler: by_doppler.map(|(measured, it)| it.witnessed(measured.ahead.distance_m)),
         }
     }
 

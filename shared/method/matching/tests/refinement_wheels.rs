@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::common::scenes::*;
 use gyre_geometry::{SparsePoint, pose};
-use gyre_matching::{Aiding, Outcome, Refined, Refiner};
+use gyre_matching::{Aiding, Outcome, Refined, Refiner, Verdict};
 
 const SCANS: usize = 100;
 /// Six seconds.
@@ -75,7 +75,7 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
         let scale = both[SCANS - 2].wheels.unwrap();
         let apart = scale.scale - 1.0 / SCALE;
         assert!(
-            apart.abs() < 3.0 * scale.sigma && scale.sigma < 3e-3,
+            apart.abs() < 3.0 * scale.scale_sigma && scale.scale_sigma < 3e-3,
             "{scale:?}"
         );
         let alone = refine_with(&mut refiner(), (&drive, &scans), |_| None, false);
@@ -89,7 +89,9 @@ fn wheels_that_slip_change_no_motion_while_the_radar_sees() {
     let (drive, scans) = faster();
     let slip = |k: usize| Some(if (40..46).contains(&k) { 1.5 } else { 1.0 });
     let slipping = refine_with(&mut refiner(), (&drive, &scans), slip, true);
-    let slips = scans_where(&slipping, |it| it.wheels.is_some_and(|it| it.slip));
+    let slips = scans_where(&slipping, |it| {
+        it.wheels.is_some_and(|it| it.verdict == Verdict::Refused)
+    });
     assert_eq!(slips, (40..46).collect::<Vec<_>>());
     let (whole, _) = off(&drive, &slipping, 0..SCANS - 1);
     assert!(whole.translation.vector.norm() < 0.5, "{whole}");

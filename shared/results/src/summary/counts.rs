@@ -1,11 +1,9 @@
 //! Counts of scans and motions.
 
-use gyre_contract::{
-    Basis, Item, MotionEstimate, PoseHeader, doppler, flag, gyro, initial_guess, outcome, wheels,
-};
+use gyre_contract::{Basis, Item, MotionEstimate, PoseHeader, flag, initial_guess, outcome};
 use serde::Serialize;
 
-use super::sensors::{Clock, too_many};
+use super::sensors::{SensorCounter, SensorCounts, too_many};
 
 /// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one
 /// scan too often for the trajectory to be the recording's.
@@ -33,15 +31,8 @@ pub struct Counts {
     /// `None`: the run refines no motions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motions: Option<MotionCounts>,
-    /// `None`: no gyro has measured a turn.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gyro: Option<GyroCounts>,
-    /// `None`: no wheels have measured a distance.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wheels: Option<WheelCounts>,
-    /// `None`: no two scans in a row have measured their velocity by Doppler.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub doppler: Option<DopplerCounts>,
+    #[serde(flatten)]
+    pub sensors: SensorCounts,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -68,101 +59,6 @@ impl LostCounts {
         self.scans += u64::from(lost.count() > 0);
         self.azimuths += lost.count() as u64;
         self.unplaced += lost.unplaced() as u64;
-    }
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct GyroCounts {
-    /// Motions whose turn it measured; the radar alone measured the others.
-    pub motions: u64,
-    /// Motions whose turn differed from the radar's turn by more than noise, and was weighed all
-    /// the same, since single matches can err by so much.
-    pub doubted: u64,
-    /// Motions that did not use the gyro: its turn differed from the radar's turn, or had differed
-    /// recently.
-    pub refused: u64,
-    /// Bias after the last of them, rad/s.
-    pub bias_radps: f64,
-    /// Standard deviation of that bias, rad/s.
-    pub bias_sigma_radps: f64,
-    /// Scale (true turn over measured turn) after the last of these motions.
-    pub scale: f64,
-    /// Delay of its stamps and its standard deviation, s; `None`: it is unknown.
-    pub delay_s: Option<[f64; 2]>,
-}
-
-impl GyroCounts {
-    fn add(&mut self, motion: &MotionEstimate) {
-        let refinement = &motion.refinement;
-        if refinement.gyro == gyro::NONE {
-            return;
-        }
-        self.motions += 1;
-        self.doubted += u64::from(refinement.gyro == gyro::DOUBTED);
-        self.refused += u64::from(refinement.gyro == gyro::REFUSED);
-        self.bias_radps = refinement.gyro_bias_radps;
-        self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
-        self.scale = refinement.gyro_scale;
-    }
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct WheelCounts {
-    pub motions: u64,
-    /// Motions with slip: the distance differed from the radar's distance, or had differed
-    /// recently.
-    pub slips: u64,
-    /// Those that were predicted by them, since the radar saw nothing that matched.
-    pub predicted: u64,
-    /// True distance over distance of the wheels, after the last of them.
-    pub scale: f64,
-    pub scale_sigma: f64,
-    /// Delay of the stamps and its standard deviation, s; `None`: it is unknown.
-    pub delay_s: Option<[f64; 2]>,
-}
-
-impl WheelCounts {
-    fn add(&mut self, motion: &MotionEstimate) {
-        let refinement = &motion.refinement;
-        if refinement.wheels == wheels::NONE {
-            return;
-        }
-        let is_used = refinement.wheels == wheels::USED;
-        self.motions += 1;
-        self.slips += u64::from(!is_used);
-        self.predicted += u64::from(is_used && refinement.outcome == outcome::PREDICTED);
-        self.scale = refinement.wheel_scale;
-        self.scale_sigma = refinement.wheel_scale_sigma;
-    }
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct DopplerCounts {
-    /// Motions between two scans that both measured it.
-    pub motions: u64,
-    /// Motions that did not use it: it differed from the radar's matches, or had differed recently.
-    pub refused: u64,
-    /// Those that were predicted by it, since nothing matched.
-    pub predicted: u64,
-    /// True velocity over the measured one, after the last of them.
-    pub scale: f64,
-    pub scale_sigma: f64,
-}
-
-impl DopplerCounts {
-    fn add(&mut self, motion: &MotionEstimate) {
-        let refinement = &motion.refinement;
-        if refinement.doppler == doppler::NONE {
-            return;
-        }
-        let is_used = refinement.doppler == doppler::USED;
-        self.motions += 1;
-        self.refused += u64::from(!is_used);
-        // Wheels go before.
-        let is_alone = is_used && refinement.wheels != wheels::USED;
-        self.predicted += u64::from(is_alone && refinement.outcome == outcome::PREDICTED);
-        self.scale = refinement.doppler_scale;
-        self.scale_sigma = refinement.doppler_scale_sigma;
     }
 }
 
@@ -227,11 +123,7 @@ pub struct Counter {
     gaps: Gaps,
     lost: LostCounts,
     motions: MotionCounts,
-    gyro: GyroCounts,
-    wheels: WheelCounts,
-    doppler: DopplerCounts,
-    gyro_clock: Clock,
-    wheel_clock: Clock,
+    sensors: SensorCounter,
 }
 
 impl Counter {
@@ -243,15 +135,7 @@ impl Counter {
         self.gaps.add(pose);
         self.lost.add(&pose.item);
         self.motions.add(&pose.motion);
-        self.gyro.add(&pose.motion);
-        self.wheels.add(&pose.motion);
-        self.doppler.add(&pose.motion);
-        let (motion, of) = (&pose.motion, &pose.motion.refinement);
-        // A registered turn depends on the gyro.
-        let turn = (of.gyro != gyro::NONE).then_some(of.gyro_turn_rad);
-        self.gyro_clock.add(pose, motion.searched[2], turn);
-        let distance = (of.wheels != wheels::NONE).then_some(of.wheel_distance_m);
-        self.wheel_clock.add(pose, motion.x_m, distance);
+        self.sensors.add(pose);
     }
 
     pub fn course(&mut self, path_m: f64) -> Course {
@@ -271,9 +155,6 @@ impl Counter {
         let next = |of: fn(&Item) -> u64| end.map(of).or(last.map(|last| of(last) + 1));
         let published = next(|item| item.published).unwrap_or(0);
         let seen = next(|item| item.scan).map_or(0, |next| next.saturating_sub(first as u64));
-        let (mut gyro, mut wheels) = (self.gyro, self.wheels);
-        gyro.delay_s = self.gyro_clock.delay_s(true);
-        wheels.delay_s = self.wheel_clock.delay_s(false);
         Counts {
             published,
             processed: self.processed,
@@ -283,9 +164,7 @@ impl Counter {
             breaks: self.starts.saturating_sub(1),
             lost: (self.lost.scans > 0).then_some(self.lost),
             motions: refines.then_some(self.motions),
-            gyro: (gyro.motions > 0).then_some(gyro),
-            wheels: (wheels.motions > 0).then_some(wheels),
-            doppler: (self.doppler.motions > 0).then_some(self.doppler),
+            sensors: self.sensors.counts(),
         }
     }
 }
@@ -352,7 +231,7 @@ impl Gaps {
 
 #[cfg(test)]
 mod tests {
-    use gyre_contract::RefinementRecord;
+    use gyre_contract::{RefinementRecord, Witness, verdict};
     use gyre_geometry::LostAzimuths;
 
     use super::*;
@@ -410,9 +289,10 @@ mod tests {
                 outcome,
                 initial_guess,
                 stationary: u64::from(outcome == outcome::WEAK),
-                wheels: u64::from(initial_guess == initial_guess::SEARCH) * wheels::USED,
                 ..RefinementRecord::default()
             };
+            let wheels = pose.motion.refinement.of_mut(Witness::Wheels);
+            wheels.verdict = u64::from(initial_guess == initial_guess::SEARCH) * verdict::USED;
             pose
         };
         let poses = [

@@ -126,7 +126,8 @@ mod tests {
     use super::*;
     use crate::summary::{
         Counts, Course, HARDLY_MEASURED, Measured, Session, SlamSummary,
-        counts::{GyroCounts, MotionCounts, WheelCounts},
+        counts::MotionCounts,
+        sensors::{SensorCount, SensorCounts},
     };
 
     fn summary(rate: &str, counts: Counts, p99_us: f64) -> Summary {
@@ -212,18 +213,19 @@ look at     gyre report out/radiate --open; all figures:
     #[test]
     fn motions_without_a_match_and_sensors_that_are_wrong_or_unused_are_a_problem() {
         let problem = |unsure, doubted, slips, scale, delay_s| {
-            let gyro = GyroCounts {
+            let mut gyro = SensorCount {
                 motions: 400,
                 doubted,
-                scale,
                 delay_s: Some([delay_s, 0.03]),
-                ..GyroCounts::default()
+                ..SensorCount::default()
             };
-            let wheels = WheelCounts {
+            gyro.last.scale = scale;
+            let wheels = SensorCount {
                 motions: 400,
-                slips,
-                ..WheelCounts::default()
+                refused: slips,
+                ..SensorCount::default()
             };
+            let gyro = (scale > 0.0).then_some(gyro);
             let motions = MotionCounts {
                 refined: 465,
                 unsure,
@@ -232,8 +234,7 @@ look at     gyre report out/radiate --open; all figures:
             let counts = Counts {
                 processed: 466,
                 motions: Some(motions),
-                gyro: (scale > 0.0).then_some(gyro),
-                wheels: Some(wheels),
+                sensors: SensorCounts([gyro, Some(wheels), None]),
                 ..Counts::default()
             };
             let summary = summary("max", counts, 1e6);

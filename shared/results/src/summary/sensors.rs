@@ -1,10 +1,13 @@
-//! The use of gyro, wheels and GNSS in a run, and errors of their settings.
+//! The use of gyro, wheels, Doppler and GNSS in a run, and errors of their settings.
 
 use std::collections::VecDeque;
 
 use gyre_calibration::{Compared, delay};
 use gyre_configuration::Configuration;
-use gyre_contract::{PoseHeader, flag, initial_guess, outcome};
+use gyre_contract::{
+    Measures, PoseHeader, Witness, WitnessRecord, flag, initial_guess, outcome, verdict,
+};
+use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{Counts, GnssSummary};
 
@@ -17,6 +20,119 @@ const MIN_CONTRADICTIONS: u64 = 10;
 const DELAY_SIGMAS: f64 = 4.0;
 /// The delay is measured over so many motions: an hour.
 const MOTIONS_OF_DELAY: usize = 1 << 14;
+
+/// The part of a kind of sensor in the motions of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorCount {
+    /// Motions that it measured; the radar alone measured the others.
+    pub motions: u64,
+    /// Motions whose measurement differed from the radar's by more than noise, and was weighed all
+    /// the same, since single matches can err by so much.
+    pub doubted: u64,
+    /// Motions that did not use it: it differed from the radar, or had differed recently.
+    pub refused: u64,
+    /// Motions that were predicted by it, since the radar saw nothing that matched.
+    pub predicted: u64,
+    /// Scale and bias after the last of these motions.
+    pub last: WitnessRecord,
+    /// Delay of its stamps and its standard deviation, s; `None`: it is unknown.
+    pub delay_s: Option<[f64; 2]>,
+}
+
+/// Of each kind; `None`: it has measured nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorCounts(pub [Option<SensorCount>; Witness::ALL.len()]);
+
+impl SensorCounts {
+    pub fn of(&self, kind: Witness) -> Option<&SensorCount> {
+        self.0[kind as usize].as_ref()
+    }
+}
+
+impl Serialize for SensorCounts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let kinds = Witness::ALL.into_iter();
+        let there = kinds.filter_map(|kind| Some((kind.name(), Named(kind, self.of(kind)?))));
+        serializer.collect_map(there)
+    }
+}
+
+struct Named<'a>(Witness, &'a SensorCount);
+
+impl Serialize for Named<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self(kind, count) = self;
+        let (row, last) = (kind.row(), &count.last);
+        let [_, refused] = row.refused;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("motions", &count.motions)?;
+        match row.measures {
+            Measures::Turn => {
+                map.serialize_entry("doubted", &count.doubted)?;
+                map.serialize_entry(refused, &count.refused)?;
+                map.serialize_entry("bias_radps", &last.bias)?;
+                map.serialize_entry("bias_sigma_radps", &last.bias_sigma)?;
+                map.serialize_entry("scale", &last.scale)?;
+            }
+            Measures::Distance => {
+                map.serialize_entry(refused, &count.refused)?;
+                map.serialize_entry("predicted", &count.predicted)?;
+                map.serialize_entry("scale", &last.scale)?;
+                map.serialize_entry("scale_sigma", &last.scale_sigma)?;
+            }
+        }
+        if row.samples.is_some() {
+            map.serialize_entry("delay_s", &count.delay_s)?;
+        }
+        map.end()
+    }
+}
+
+#[derive(Debug, Default)]
+pub struct SensorCounter {
+    counts: [SensorCount; Witness::ALL.len()],
+    clocks: [Clock; Witness::ALL.len()],
+}
+
+impl SensorCounter {
+    pub fn add(&mut self, pose: &PoseHeader) {
+        let (motion, record) = (&pose.motion, &pose.motion.refinement);
+        for (kind, _) in Witness::sampled() {
+            let by_radar = match kind.row().measures {
+                // A registered turn depends on the gyro.
+                Measures::Turn => motion.searched[2],
+                Measures::Distance => motion.x_m,
+            };
+            self.clocks[kind as usize].add(pose, by_radar, record.of(kind).measured());
+        }
+        let is_predicted = record.outcome == outcome::PREDICTED;
+        for kind in Witness::ALL {
+            let (of, count) = (record.of(kind), &mut self.counts[kind as usize]);
+            if of.verdict == verdict::NONE {
+                continue;
+            }
+            count.motions += 1;
+            count.doubted += u64::from(of.verdict == verdict::DOUBTED);
+            count.refused += u64::from(of.verdict == verdict::REFUSED);
+            count.predicted += u64::from(is_predicted && record.distance_by() == Some(kind));
+            count.last = *of;
+        }
+    }
+
+    pub fn counts(self) -> SensorCounts {
+        let mut clocks = self.clocks.into_iter();
+        let all = Witness::ALL.map(|kind| {
+            let has_bias = kind.row().measures == Measures::Turn;
+            let delay_s = clocks.next().and_then(|clock| clock.delay_s(has_bias));
+            let count = SensorCount {
+                delay_s,
+                ..self.counts[kind as usize]
+            };
+            (count.motions > 0).then_some(count)
+        });
+        SensorCounts(all)
+    }
+}
 
 /// The motions by the radar alone and by a sensor, to measure the delay between them.
 #[derive(Debug, Default)]
@@ -59,44 +175,56 @@ pub fn problem(
     // Without a refinement it is not known what gyro and wheels were used for.
     let motions = counts.processed.saturating_sub(1 + counts.breaks);
     let motions = counts.motions.map_or(0, |_| motions);
-    let unused = [
-        ("gyro", config.gyro.is_used() && counts.gyro.is_none()),
-        ("wheels", config.wheels.is_used() && counts.wheels.is_none()),
-    ];
-    if let Some((section, _)) = unused.iter().find(|it| it.1 && motions > 0) {
+    let settings = |kind| match kind {
+        Witness::Gyro => (config.gyro.is_used(), config.gyro.delay_s),
+        Witness::Wheels => (config.wheels.is_used(), config.wheels.delay_s),
+        Witness::Doppler => (config.doppler.is_used(), 0.0),
+    };
+    let is_unused = |kind: &Witness| settings(*kind).0 && counts.sensors.of(*kind).is_none();
+    let sampled = || Witness::sampled().map(|(kind, _)| kind);
+    if let Some(section) = sampled().find(is_unused).map(Witness::name)
+        && motions > 0
+    {
         return Some(format!(
             "{section}.kind is set, but none of the {motions} motions has a measurement of it: no samples arrived, or they are farther apart than {section}.max_gap_s. `gyre inspect` shows the log of a recording, and {section}.kind=none leaves it out"
         ));
     }
-    let by_gyro = counts.gyro.and_then(|it| {
-        let doubts = it.doubted + it.refused;
-        let is_wrong = too_many(doubts, it.motions, MAX_DOUBTED_SHARE)
-            || !config.gyro.allows_scale(it.scale);
-        let cause = cause("gyro", config.gyro.delay_s, it.delay_s, is_wrong)?;
-        Some(format!(
-            "the gyro contradicts the radar: {doubts} of its {} turns were doubted or refused; {cause}, and gyro.kind=none leaves it out",
-            it.motions
-        ))
-    });
-    let by_wheels = || {
-        let it = counts.wheels?;
-        let is_wrong = too_many(it.slips, it.motions, MAX_SLIPPING_SHARE);
-        let cause = cause("wheels", config.wheels.delay_s, it.delay_s, is_wrong)?;
-        Some(format!(
-            "the wheels contradict the radar: {} of their {} distances are not those that it sees; {cause}, and wheels.kind=none leaves them out",
-            it.slips, it.motions
-        ))
+    let contradicted = |kind: Witness| {
+        let it = counts.sensors.of(kind)?;
+        let contradictions = it.doubted + it.refused;
+        let is_wrong = match kind.row().measures {
+            Measures::Turn => {
+                too_many(contradictions, it.motions, MAX_DOUBTED_SHARE)
+                    || !config.gyro.allows_scale(it.last.scale)
+            }
+            Measures::Distance => too_many(contradictions, it.motions, MAX_SLIPPING_SHARE),
+        };
+        let section = kind.name();
+        let cause = cause(kind, settings(kind).1, it.delay_s, is_wrong)?;
+        let motions = it.motions;
+        Some(match kind.row().measures {
+            Measures::Turn => format!(
+                "the {section} contradicts the radar: {contradictions} of its {motions} turns were doubted or refused; {cause}, and {section}.kind=none leaves it out"
+            ),
+            Measures::Distance => format!(
+                "the {section} contradict the radar: {contradictions} of their {motions} distances are not those that it sees; {cause}, and {section}.kind=none leaves them out"
+            ),
+        })
     };
     let by_gnss = || {
         let (reason, _) = gnss?.refusal().filter(|it| it.1)?;
         Some(format!("the fixes of GNSS are not used: {reason}"))
     };
-    by_gyro.or_else(by_wheels).or_else(by_gnss)
+    sampled().find_map(contradicted).or_else(by_gnss)
 }
 
-/// Returns which key of a section is wrong: by a delay, if that is certain.
-fn cause(section: &str, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
-    let up = if section == "gyro" { "`gyro.up`, " } else { "" };
+/// Returns which key of a sensor is wrong: by a delay, if that is certain.
+fn cause(kind: Witness, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
+    let section = kind.name();
+    let up = match kind.row().measures {
+        Measures::Turn => "`gyro.up`, ",
+        Measures::Distance => "",
+    };
     match measured {
         Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
@@ -112,4 +240,46 @@ fn cause(section: &str, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) 
 
 pub fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {
     contradictions >= MIN_CONTRADICTIONS && contradictions as f64 > max_share * motions as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_has_its_keys_and_a_prediction_is_by_the_first_that_measures_the_distance() {
+        let mut counter = SensorCounter::default();
+        let of = [verdict::USED, verdict::DOUBTED, verdict::REFUSED];
+        for (gyro, wheels, doppler) in [(0, 0, 0), (1, 2, 0), (2, 2, 2), (0, 0, 2)] {
+            let mut pose = PoseHeader::default();
+            let record = &mut pose.motion.refinement;
+            record.outcome = outcome::PREDICTED;
+            for (of_kind, index) in record.witnesses.iter_mut().zip([gyro, wheels, doppler]) {
+                *of_kind = WitnessRecord {
+                    verdict: of[index],
+                    measured: 7.0,
+                    scale: 1.5,
+                    scale_sigma: 0.25,
+                    bias: 0.5,
+                    bias_sigma: 0.125,
+                };
+            }
+            counter.add(&pose);
+        }
+        let counts = Counts {
+            sensors: counter.counts(),
+            ..Counts::default()
+        };
+        let expected = concat!(
+            r#"{"published":0,"processed":0,"dropped":0,"unreadable":0,"missing":0,"breaks":0,"#,
+            r#""gyro":{"motions":4,"doubted":1,"refused":1,"bias_radps":0.5,"#,
+            r#""bias_sigma_radps":0.125,"scale":1.5,"delay_s":null},"#,
+            r#""wheels":{"motions":4,"slips":2,"predicted":2,"scale":1.5,"scale_sigma":0.25,"#,
+            r#""delay_s":null},"#,
+            r#""doppler":{"motions":4,"refused":2,"predicted":1,"scale":1.5,"scale_sigma":0.25}}"#,
+        );
+        assert_eq!(serde_json::to_string(&counts).unwrap_or_default(), expected);
+        let none = SensorCounter::default().counts();
+        assert_eq!(serde_json::to_string(&none).unwrap_or_default(), "{}");
+    }
 }

@@ -1,4 +1,4 @@
-use gyre_contract::{gyro, outcome};
+use gyre_contract::outcome;
 
 use super::*;
 
@@ -13,8 +13,7 @@ const CLOCK: PlayedClock = PlayedClock {
 
 fn others() -> Others {
     Others {
-        gyro: true,
-        wheels: true,
+        used: [true, true, false],
         are_weighed: true,
     }
 }
@@ -29,11 +28,13 @@ fn pose(scan: u64, outcome: u32, [gyro, wheels]: [u64; 2]) -> PoseHeader {
     hop.published_ns = BEGAN_NS + scan as i64 * PERIOD_NS + PERIOD_NS / 2 + 20_000_000;
     pose.motion.x_m = 2.5;
     let record = &mut pose.motion.refinement;
-    (record.outcome, record.gyro, record.wheels) = (outcome, gyro, wheels);
+    record.outcome = outcome;
+    record.of_mut(Witness::Gyro).verdict = gyro;
+    record.of_mut(Witness::Wheels).verdict = wheels;
     pose
 }
 
-const NORMAL: (u32, [u64; 2]) = (outcome::REFINED, [gyro::USED, wheels::USED]);
+const NORMAL: (u32, [u64; 2]) = (outcome::REFINED, [verdict::USED, verdict::USED]);
 
 /// The faults of a scenario after a drive. The scans from one number up to another (excluded)
 /// report `meanwhile`.
@@ -57,7 +58,7 @@ fn told(
 #[test]
 fn a_gyro_that_is_out_is_noticed_and_the_recovery_counts_from_its_end() {
     // Absent from 4 s to 7 s: scans 16 to 28, the last half covered, and one more.
-    let meanwhile = (outcome::REFINED, [gyro::NONE, wheels::USED]);
+    let meanwhile = (outcome::REFINED, [verdict::NONE, verdict::USED]);
     let (faults, omitted) = told(Scenario::GyroOut, &[(16, 30)], meanwhile);
     assert_eq!((omitted, faults.len()), (None, 1));
     let fault = &faults[0];
@@ -76,13 +77,13 @@ fn a_fault_that_nothing_notices_or_that_does_not_end_is_a_problem() {
         let (unseen, _) = told(scenario, &[], NORMAL);
         let said = unseen[0].problem().unwrap();
         assert!(said.starts_with("nothing has noticed the fault"), "{said}");
-        let lost = (outcome::PREDICTED, [gyro::NONE, wheels::SLIP]);
+        let lost = (outcome::PREDICTED, [verdict::NONE, verdict::REFUSED]);
         let (endless, _) = told(scenario, &[(16, 200)], lost);
         let said = endless[0].problem().unwrap();
         assert!(said.ends_with("was as before it"), "{said}");
     }
     // One of both is not enough where both clocks jump.
-    let by_wheels = (outcome::REFINED, [gyro::NONE, wheels::USED]);
+    let by_wheels = (outcome::REFINED, [verdict::NONE, verdict::USED]);
     let (half, _) = told(Scenario::ClockJump, &[(16, 33)], by_wheels);
     assert!(half[0].problem().unwrap().starts_with("nothing"));
 }
@@ -93,7 +94,7 @@ fn a_radar_that_is_blind_three_times_recovers_before_the_next_time() {
     let times: Vec<_> = faults.iter().map(|it| [it.from_s, it.ends_s()]).collect();
     assert_eq!(times, [[4.0, 6.0], [10.0, 15.0], [19.0, 29.0]]);
     assert_eq!(needed_s(&faults), 33.0);
-    let blind = (outcome::PREDICTED, [gyro::USED, wheels::USED]);
+    let blind = (outcome::PREDICTED, [verdict::USED, verdict::USED]);
     // The second time lasts until the third begins.
     let spans = [(16, 25), (40, 76), (76, 117)];
     let (told, _) = told(Scenario::RadarBlind, &spans, blind);
@@ -105,7 +106,7 @@ fn a_radar_that_is_blind_three_times_recovers_before_the_next_time() {
 
 #[test]
 fn without_a_normal_motion_before_a_fault_it_says_nothing() {
-    let refused = (outcome::REFINED, [gyro::REFUSED, wheels::USED]);
+    let refused = (outcome::REFINED, [verdict::REFUSED, verdict::USED]);
     let (_, omitted) = told(Scenario::GyroOut, &[(0, 16)], refused);
     assert!(omitted.unwrap().contains("no motion before the fault"));
     let late = WitnessFaults::new(faults(Scenario::GyroOut), others(), CLOCK, BEGAN_NS);

@@ -15,6 +15,8 @@ use gyre_geometry::{
 use nalgebra::{Matrix3, Matrix4, RowVector4, Vector4};
 use serde::{Deserialize, Serialize};
 
+use super::Witnessed;
+
 /// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
 /// one of them is wrong: four standard deviations.
 pub(super) const GATE: f64 = 16.0;
@@ -66,14 +68,6 @@ pub enum Verdict {
     Doubted,
     /// The gyro is wrong: it is not used.
     Refused,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GyroBias {
-    pub rate_radps: f64,
-    pub sigma_radps: f64,
-    pub scale: f64,
-    pub verdict: Verdict,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -145,12 +139,15 @@ impl Heading {
         }
     }
 
-    pub(super) fn bias(&self) -> GyroBias {
-        GyroBias {
-            rate_radps: self.bias_radps,
-            sigma_radps: self.covariance[(BIAS, BIAS)].max(0.0).sqrt(),
-            scale: self.scale,
+    pub(super) fn witnessed(&self, measured: f64) -> Witnessed {
+        let sigma = |state| self.covariance[(state, state)].max(0.0).sqrt();
+        Witnessed {
             verdict: self.verdict,
+            measured,
+            scale: self.scale,
+            scale_sigma: sigma(SCALE),
+            bias: self.bias_radps,
+            bias_sigma: sigma(BIAS),
         }
     }
 

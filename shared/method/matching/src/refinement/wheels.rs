@@ -10,7 +10,10 @@ use gyre_geometry::{
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::heading::{GATE, grown};
+use super::{
+    Witnessed,
+    heading::{GATE, Verdict, grown},
+};
 
 /// Random walk of the scale, /√s: tyres that warm change it by 0.06 % in an hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
@@ -35,14 +38,6 @@ pub struct WheelState {
     /// Covariance of the predicted motions since then together, or since a new map was started:
     /// along the axes of the last scan.
     pub unmatched: Matrix3<f64>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WheelScale {
-    pub scale: f64,
-    pub sigma: f64,
-    /// They disagree with the registered motion, or have last done so: they are not used.
-    pub slip: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,11 +115,17 @@ impl WheelState {
         }
     }
 
-    pub(super) fn estimate(&self) -> WheelScale {
-        WheelScale {
+    pub(super) fn witnessed(&self, measured: f64) -> Witnessed {
+        Witnessed {
+            verdict: match self.slips {
+                true => Verdict::Refused,
+                false => Verdict::Agrees,
+            },
+            measured,
             scale: self.scale,
-            sigma: self.covariance[(1, 1)].max(0.0).sqrt(),
-            slip: self.slips,
+            scale_sigma: self.covariance[(1, 1)].max(0.0).sqrt(),
+            bias: 0.0,
+            bias_sigma: 0.0,
         }
     }
 

@@ -11,7 +11,7 @@ use gyre_geometry::{
     xy_yaw,
 };
 use gyre_matching::{
-    Refiner,
+    Refiner, Verdict,
     odometry::{Odometry, OdometryConfig},
 };
 use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
@@ -134,7 +134,10 @@ impl Drive {
             let refined = refiner.refine(k as u64, later, earlier, &scan.searched, interval_s);
             motions.push(xy_yaw(&refined.motion.motion).map(f64::to_bits));
             let turn = format!("turn {:?}", refined.gyro.map(|it| it.verdict));
-            let distance = format!("slip {:?}", refined.wheels.map(|it| it.slip));
+            let distance = format!(
+                "slip {:?}",
+                refined.wheels.map(|it| it.verdict == Verdict::Refused)
+            );
             for counted in [turn, distance, format!("{:?}", refined.outcome)] {
                 *counts.entry(counted).or_default() += 1;
             }
