@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use gyre_geometry::samples::{Geographic, LocalPlane, RawFix};
+use gyre_geometry::samples::{Geographic, LocalPlane, Sample};
 use nalgebra::Vector2;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -46,7 +46,7 @@ pub(crate) fn fixes(
     seed: u64,
     path: &dyn Path,
     (start_ns, end_s): (i64, f64),
-) -> Option<Vec<RawFix>> {
+) -> Option<Vec<Sample>> {
     (config.rate_hz > 0.0).then(|| {
         let plane = LocalPlane::new(ORIGIN, 0.0);
         let mut rng = Stream::GNSS_ERRORS.generator(seed);
@@ -62,22 +62,20 @@ pub(crate) fn fixes(
             let is_hole = holes.begin_s(time_s).is_some() && config.faults;
             let antenna = path.pose(time_s).translation.vector + error_m;
             let place = plane.place([antenna.x, antenna.y]);
-            (!is_hole).then(|| RawFix {
-                stamp_ns: start_ns + (time_s * 1e9).round() as i64,
-                at: [place.latitude_deg, place.longitude_deg],
-                sigma_m: NOISE_M.hypot(BIAS_M),
-                ..RawFix::default()
+            (!is_hole).then(|| {
+                let stamp_ns = start_ns + (time_s * 1e9).round() as i64;
+                let at = [place.latitude_deg, place.longitude_deg];
+                Sample::fix(stamp_ns, at, 0.0, NOISE_M.hypot(BIAS_M))
             })
         };
         (0..count).filter_map(fix).collect()
     })
 }
 
-pub(crate) fn csv(fixes: &[RawFix]) -> String {
+pub(crate) fn csv(fixes: &[Sample]) -> String {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {
-        let [latitude_deg, longitude_deg] = fix.at;
-        let (stamp_ns, sigma_m) = (fix.stamp_ns, fix.sigma_m);
+        let (stamp_ns, [latitude_deg, longitude_deg, _, sigma_m, ..]) = (fix.stamp_ns, fix.values);
         let _ = writeln!(text, "{stamp_ns},{latitude_deg},{longitude_deg},{sigma_m}");
     }
     text
@@ -92,7 +90,7 @@ mod tests {
     use super::*;
     use crate::{SimulationConfig, simulator::Simulator};
 
-    fn fixes_of(simulator: &Simulator) -> Option<Vec<RawFix>> {
+    fn fixes_of(simulator: &Simulator) -> Option<Vec<Sample>> {
         let (config, path) = (simulator.config(), simulator.path());
         fixes(&config.gnss, config.seed, path, simulator.span())
     }
@@ -115,13 +113,13 @@ mod tests {
         };
         let (simulator, fixes) = simulated(false);
         let plane = LocalPlane::new(ORIGIN, 0.0);
-        let square_m2 = |fix: &RawFix| {
+        let square_m2 = |fix: &Sample| {
             let time_s = (fix.stamp_ns - simulator.span().0) as f64 * 1e-9;
             let truth = simulator.path().pose(time_s).translation.vector;
             (Vector2::from(plane.east_north(fix.geographic())) - truth).norm_squared()
         };
         let mean_m2 = fixes.iter().map(square_m2).sum::<f64>() / fixes.len() as f64;
-        let stated = 2.0 * fixes[0].sigma_m.powi(2);
+        let stated = 2.0 * fixes[0].values[3].powi(2);
         assert_eq!(fixes.len(), 2000);
         assert!((0.3..3.0).contains(&(mean_m2 / stated)), "{mean_m2}");
         let holes = simulated(true).1.len();

@@ -9,10 +9,7 @@ use std::{
 };
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
-use gyre_geometry::{
-    OwnedScan, ScanSlot,
-    samples::{RawFix, Sample},
-};
+use gyre_geometry::{OwnedScan, ScanSlot, samples::Sample};
 use gyre_radar::Trajectory;
 
 use crate::{
@@ -145,7 +142,7 @@ impl SimulatedDrive {
         wheels::samples(&config.wheels, config.seed, path, self.simulator.span())
     }
 
-    fn fixes(&self) -> Option<Vec<RawFix>> {
+    fn fixes(&self) -> Option<Vec<Sample>> {
         let (config, path) = (self.simulator.config(), self.simulator.path());
         gnss::fixes(&config.gnss, config.seed, path, self.simulator.span())
     }

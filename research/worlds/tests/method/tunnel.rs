@@ -4,7 +4,7 @@
 use std::{fmt::Write as _, path::Path};
 
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
-use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw, samples::{DopplerKind, GyroKind, WheelsKind}, OwnedScan};
+use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw, samples::{DopplerKind, GyroKind, SampleKind, WheelsKind}, OwnedScan};
 use gyre_matching::{odometry::{Odometry, OdometryConfig}, InitialGuess};
 use gyre_worlds::{GyroProfile, OutputFormat, Profile, SimulatedDrive, SimulationConfig, TunnelConfig, drive::DriveConfig};
 use nalgebra::Vector3;
@@ -85,13 +85,15 @@ fn with(
     let (mut samples, path) = (ScanSamples::None, Path::new("simulation"));
     if gyro {
         config.gyro.kind = GyroKind::Auto;
-        let log = SampleLog::of_gyro(drive.gyro_samples().unwrap(), path).unwrap();
-        samples = ScanSamples::of_gyro(&log, &config.gyro, dataset).unwrap();
+        let gyro = drive.gyro_samples().unwrap().into();
+        let log = SampleLog::of(SampleKind::Gyro, gyro, path).unwrap();
+        samples = ScanSamples::of_log(&log, &config.gyro, dataset).unwrap();
     }
     if wheels {
         config.wheels.kind = WheelsKind::Auto;
-        let log = SampleLog::of_wheels(drive.wheel_samples().unwrap(), path).unwrap();
-        samples = samples.and(ScanSamples::of_wheels(&log, &config.wheels, dataset).unwrap());
+        let wheels = drive.wheel_samples().unwrap().into();
+        let log = SampleLog::of(SampleKind::Wheels, wheels, path).unwrap();
+        samples = samples.and(ScanSamples::of_log(&log, &config.wheels, dataset).unwrap());
     }
     (config, samples)
 }

@@ -11,7 +11,7 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_datasets::SampleLog;
-use gyre_geometry::samples::{GyroConfig, GyroKind, WheelsConfig};
+use gyre_geometry::samples::{GyroConfig, GyroKind, SampleKind, WheelsConfig};
 
 use super::Section;
 
@@ -111,8 +111,8 @@ macro_rules! sensor {
 sensor! {
     Gyro: "gyro, log", "gyro is", gyro, calibrate_gyro,
     SampleLog, GyroConfig, GyroCalibration,
-    beside: |folder: &Path| SampleLog::find_gyro(folder).ok(),
-    read: |file: &Path, _: &GyroConfig| SampleLog::read_gyro(file),
+    beside: |folder: &Path| SampleLog::find(SampleKind::Gyro, folder).ok(),
+    read: |file: &Path, _: &GyroConfig| SampleLog::read(SampleKind::Gyro, file, None),
     mean: GyroCalibration::mean,
     toml: |found: &GyroCalibration, file: Option<&Path>, _: &GyroConfig| found.toml(file)
 }
@@ -120,8 +120,8 @@ sensor! {
 sensor! {
     Wheels: "wheels, log", "wheels are", wheels, calibrate_wheels,
     SampleLog, WheelsConfig, WheelCalibration,
-    beside: |folder: &Path| SampleLog::find_wheels(folder).ok(),
-    read: |file: &Path, config: &WheelsConfig| SampleLog::read_wheels(file, config.m_per_tick),
+    beside: |folder: &Path| SampleLog::find(SampleKind::Wheels, folder).ok(),
+    read: |file: &Path, config: &WheelsConfig| SampleLog::read(SampleKind::Wheels, file, config.m_per_tick),
     mean: |one: &WheelCalibration, others: &[WheelCalibration]| -> Result<_, Failure> {
         Ok(one.mean(others))
     },
