@@ -2,7 +2,7 @@
 
 use std::{f64::consts::TAU, fmt::Write as _};
 
-use gyre_geometry::samples::{Geographic, LocalPlane, RawFix};
+use gyre_geometry::samples::{Geographic, LocalPlane, Sample};
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -122,30 +122,26 @@ pub(crate) fn fixes(
     seed: u64,
     path: &dyn Path,
     (start_ns, end_s): (i64, f64),
-) -> Option<Vec<RawFix>> {
+) -> Option<Vec<Sample>> {
     (config.rate_hz > 0.0).then(|| {
         let mut receiver = Receiver::new(config, seed, path);
         let count = (end_s * config.rate_hz).ceil() as usize;
         let fix = |index: usize| {
             let time_s = index as f64 / config.rate_hz;
             let place = receiver.measure(time_s, tunnels)?;
-            Some(RawFix {
-                stamp_ns: start_ns + ((time_s + config.late_s) * 1e9).round() as i64,
-                at: [place.latitude_deg, place.longitude_deg],
-                sigma_m: config.noise_m.hypot(config.bias_m),
-                ..RawFix::default()
-            })
+            let stamp_ns = start_ns + ((time_s + config.late_s) * 1e9).round() as i64;
+            let at = [place.latitude_deg, place.longitude_deg];
+            Some(Sample::fix(stamp_ns, at, 0.0, config.noise_m.hypot(config.bias_m)))
         };
         (0..count).filter_map(fix).collect()
     })
 }
 
 /// The fixes as CSV: the numbers read from it are those of the fixes.
-pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
+pub(crate) fn csv(fixes: &[Sample]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {
-        let [latitude_deg, longitude_deg] = fix.at;
-        let (stamp_ns, sigma_m) = (fix.stamp_ns, fix.sigma_m);
+        let (stamp_ns, [latitude_deg, longitude_deg, _, sigma_m, ..]) = (fix.stamp_ns, fix.values);
         let _ = writeln!(text, "{stamp_ns},{latitude_deg},{longitude_deg},{sigma_m}");
     }
     text.into_bytes()
@@ -249,7 +245,7 @@ mod tests {
     fn simulated(
         gnss: SimulatedGnssConfig,
         tunnels: Vec<TunnelConfig>,
-    ) -> (Vec<RawFix>, Vec<Vector2<f64>>) {
+    ) -> (Vec<Sample>, Vec<Vector2<f64>>) {
         let mut config = SimulationConfig {
             scans: Some(120),
             gnss,
@@ -261,14 +257,8 @@ mod tests {
         config.drive.length_m = 300.0;
         let simulator = Simulator::new(&config).expect("a drive");
         let fixes = simulator.gnss_fixes().unwrap_or_default();
-        let plane = LocalPlane::new(
-            RawFix {
-                at: config.gnss.origin_deg,
-                ..RawFix::default()
-            }
-            .geographic(),
-            0.0,
-        );
+        let origin = Sample::fix(0, config.gnss.origin_deg, 0.0, 0.0);
+        let plane = LocalPlane::new(origin.geographic(), 0.0);
         let errors = fixes.iter().map(|fix| {
             let time_s = (fix.stamp_ns - simulator.span().0) as f64 * 1e-9 - config.gnss.late_s;
             let antenna = simulator.path().pose(time_s) * Point2::from(config.gnss.lever_m);
@@ -315,7 +305,7 @@ mod tests {
             (0..errors_m.len() - 20).map(of).sum::<f64>() / (errors_m.len() - 20) as f64
         };
         let variance_m2 = mean(&|at| 0.5 * errors_m[at].norm_squared());
-        let stated_m2 = fixes[0].sigma_m.powi(2);
+        let stated_m2 = fixes[0].values[3].powi(2);
         assert!(
             (0.7..1.4).contains(&(variance_m2 / stated_m2)),
             "{variance_m2}"

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use gyre_geometry::{Pose, samples::{RawFix, Sample}, OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_geometry::{Pose, samples::Sample, OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
 use nalgebra::Point2;
 
 use crate::{config::{MAX_SCANS, SimulationConfig}, error::SimulatorError, gyro::{Vehicle, log}, path::{Path, recorded::{self, Excerpt}}, profile::Sampling, relief::Relief, sensor::{effects::is_on, PitchRoll, Scene, Sensor, SweepTime}, streets::Streets, town::{ParkedCar, Town}, traffic::{Observer, RoadUser, Traffic}, tunnel, weather::WeatherConfig, world::World, gnss, wheels};
@@ -206,7 +206,7 @@ impl Simulator {
     }
 
     /// The fixes of the GNSS receiver, by their stamps, in degrees. `None` without a receiver.
-    pub fn gnss_fixes(&self) -> Option<Vec<RawFix>> {
+    pub fn gnss_fixes(&self) -> Option<Vec<Sample>> {
         let config = (&self.config.gnss, self.config.tunnels.as_slice());
         gnss::fixes(config, self.config.gnss_seed(), self.path(), self.span())
     }
