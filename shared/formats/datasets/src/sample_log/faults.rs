@@ -65,65 +65,35 @@ pub struct LogGap {
 /// and ABSURD stand for the first unreadable line and the words of the kind.
 pub(crate) type FaultWords = (&'static str, fn(&LogFaults) -> usize, &'static str);
 
-pub(super) const OF_SAMPLES: [FaultWords; 7] = [
-    (
-        "unreadable",
-        |it| it.unreadable,
-        "rows are not of its table, the first in line LINE: left out.",
-    ),
-    (
-        "not_a_number",
-        |it| it.not_a_number,
-        "samples have no VALUES, or some that are not finite: left out.",
-    ),
-    ("absurd", |it| it.absurd, "samples have ABSURD: left out."),
-    (
-        "spread",
-        |it| it.spread,
-        "samples come in bursts of one stamp: spread evenly back to the burst before.",
-    ),
-    (
-        "repeated",
-        |it| it.repeated,
-        "samples have the stamp of a different sample: left out.",
-    ),
-    (
-        "out_of_order",
-        |it| it.out_of_order,
-        "samples come later than their stamps say: sorted.",
-    ),
-    (
-        "measured_twice",
-        |it| it.measured_twice,
-        "samples are of times over which the clock was set back, and which have two measurements: left out.",
-    ),
-];
+macro_rules! words {
+    ($($name:ident: $words:literal),+ $(,)?) => {
+        &[$((stringify!($name), |faults| faults.$name, $words)),+]
+    };
+}
 
-pub(super) const OF_FIXES: [FaultWords; 11] = [
-    ("unreadable", |it| it.unreadable, "unreadable"),
-    ("without_fix", |it| it.without_fix, "without a fix"),
-    ("not_a_number", |it| it.not_a_number, "not a number"),
-    ("off_the_earth", |it| it.off_the_earth, "off the earth"),
-    ("zero", |it| it.zero, "at 0, 0"),
-    ("repeated", |it| it.repeated, "repeated"),
-    (
-        "frozen",
-        |it| it.frozen,
-        "at the very place of the fix before",
-    ),
-    ("out_of_order", |it| it.out_of_order, "out of order"),
-    (
-        "of_unknown_status",
-        |it| it.of_unknown_status,
-        "of unknown status, used",
-    ),
-    (
-        "too_certain",
-        |it| it.too_certain,
-        "stated better than 1 cm, used as of 1 cm",
-    ),
-    ("jumps", |it| it.jumps, "jump faster than a vehicle"),
-];
+pub(super) const OF_SAMPLES: &[FaultWords] = words! {
+    unreadable: "rows are not of its table, the first in line LINE: left out.",
+    not_a_number: "samples have no VALUES, or some that are not finite: left out.",
+    absurd: "samples have ABSURD: left out.",
+    spread: "samples come in bursts of one stamp: spread evenly back to the burst before.",
+    repeated: "samples have the stamp of a different sample: left out.",
+    out_of_order: "samples come later than their stamps say: sorted.",
+    measured_twice: "samples are of times over which the clock was set back, and which have two measurements: left out.",
+};
+
+pub(super) const OF_FIXES: &[FaultWords] = words! {
+    unreadable: "unreadable",
+    without_fix: "without a fix",
+    not_a_number: "not a number",
+    off_the_earth: "off the earth",
+    zero: "at 0, 0",
+    repeated: "repeated",
+    frozen: "at the very place of the fix before",
+    out_of_order: "out of order",
+    of_unknown_status: "of unknown status, used",
+    too_certain: "stated better than 1 cm, used as of 1 cm",
+    jumps: "jump faster than a vehicle",
+};
 
 impl LogFaults {
     /// Returns how the clock steps, and where first: without a full stop.

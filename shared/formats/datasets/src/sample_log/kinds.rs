@@ -96,7 +96,7 @@ const GYRO: Kind = Kind {
     has_blanks: false,
     most: 10.0,
     beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
-    faults: &OF_SAMPLES,
+    faults: OF_SAMPLES,
     value_words: "rates",
     absurd: "rates beyond 10 rad/s, at which no vehicle turns",
     unit: "of the rates: rad/s is assumed; `gyre calibrate` tells deg/s by its scale",
@@ -164,7 +164,7 @@ const GNSS: Kind = Kind {
     values: 2,
     has_blanks: true,
     most: f64::MAX,
-    faults: &OF_FIXES,
+    faults: OF_FIXES,
     changes: None,
     ..GYRO
 };
@@ -313,20 +313,14 @@ fn speed(header: &Header) -> Result<Columns, String> {
 /// Names of the ticks of one wheel, or of an axle.
 const TICKS: &str = "ticks pulses wheel_ticks encoder_ticks";
 /// Names of the ticks of two wheels of an axle; their mean is used.
-const LEFT_AND_RIGHT: [[&str; 2]; 3] = [
-    ["left_ticks", "right_ticks"],
-    ["ticks_left", "ticks_right"],
-    ["left_count", "right_count"],
-];
+const LEFT: &str = "left_ticks ticks_left left_count";
+const RIGHT: &str = "right_ticks ticks_right right_count";
 const METRES: &str = "distance_m odometer_m mileage_m";
 
 /// The columns of an encoder or an odometer, which counts ticks or metres since some time.
 fn counts(header: &Header) -> Option<Columns> {
     let one = |names: &str| header.find(names).map(|column| [column; 2]);
-    let both = || {
-        let mut pairs = LEFT_AND_RIGHT.iter();
-        pairs.find_map(|[left, right]| Some([header.find(left)?, header.find(right)?]))
-    };
+    let both = || Some([header.find(LEFT)?, header.find(RIGHT)?]);
     let metres = one(METRES);
     let counts = metres.or_else(both).or_else(|| one(TICKS))?;
     let has_direction = header.find(DIRECTIONS).is_some();
