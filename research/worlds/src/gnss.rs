@@ -152,7 +152,7 @@ pub(crate) fn device<'a>(
             let antenna = path.pose(time_s) * Point2::from(config.lever_m) + error_m;
             let place = plane.place([antenna.x, antenna.y]);
             let sigma_m = config.noise_m.hypot(config.bias_m);
-            Some([place.latitude_deg, place.longitude_deg, sigma_m, 0.0, 0.0, 0.0])
+            Some([place.latitude_deg, place.longitude_deg, 0.0, sigma_m, 0.0, 0.0])
         }),
     })
 }
@@ -210,7 +210,7 @@ impl<'a> Surroundings<'a> {
 
 #[cfg(test)]
 mod tests {
-    use gyre_simulator::beside::{KINDS, Record};
+    use gyre_geometry::samples::{Sample, SampleKind};
 
     use super::*;
     use crate::{SimulationConfig, Simulator, drive::DriveKind};
@@ -219,7 +219,7 @@ mod tests {
     fn simulated(
         gnss: SimulatedGnssConfig,
         tunnels: Vec<TunnelConfig>,
-    ) -> (Vec<Record>, Vec<Vector2<f64>>) {
+    ) -> (Vec<Sample>, Vec<Vector2<f64>>) {
         let mut config = SimulationConfig {
             scans: Some(120),
             gnss,
@@ -230,16 +230,13 @@ mod tests {
         config.drive.speed_mps = 8.0;
         config.drive.length_m = 300.0;
         let simulator = Simulator::new(&config).expect("a drive");
-        let fixes = simulator.records(&KINDS[2]).unwrap_or_default();
-        let place = |[latitude_deg, longitude_deg]: [f64; 2]| Geographic {
-            latitude_deg,
-            longitude_deg,
-        };
-        let plane = LocalPlane::new(place(config.gnss.origin_deg), 0.0);
-        let errors = fixes.iter().map(|(stamp_ns, values)| {
-            let time_s = (stamp_ns - simulator.span().0) as f64 * 1e-9 - config.gnss.late_s;
+        let fixes = simulator.samples(SampleKind::Gnss).unwrap_or_default();
+        let origin = Sample::fix(0, config.gnss.origin_deg, 0.0, 0.0);
+        let plane = LocalPlane::new(origin.geographic(), 0.0);
+        let errors = fixes.iter().map(|fix| {
+            let time_s = (fix.stamp_ns - simulator.span().0) as f64 * 1e-9 - config.gnss.late_s;
             let antenna = simulator.path().pose(time_s) * Point2::from(config.gnss.lever_m);
-            Vector2::from(plane.east_north(place([values[0], values[1]]))) - antenna.coords
+            Vector2::from(plane.east_north(fix.geographic())) - antenna.coords
         });
         let errors = errors.collect();
         (fixes, errors)
@@ -282,7 +279,7 @@ mod tests {
             (0..errors_m.len() - 20).map(of).sum::<f64>() / (errors_m.len() - 20) as f64
         };
         let variance_m2 = mean(&|at| 0.5 * errors_m[at].norm_squared());
-        let stated_m2 = fixes[0].1[2].powi(2);
+        let stated_m2 = fixes[0].values[3].powi(2);
         assert!(
             (0.7..1.4).contains(&(variance_m2 / stated_m2)),
             "{variance_m2}"
@@ -317,7 +314,7 @@ mod tests {
         let (fixes, _) = simulated(exact(), vec![tunnel]);
         let gaps_ns = fixes
             .windows(2)
-            .map(|pair| pair[1].0 - pair[0].0);
+            .map(|pair| pair[1].stamp_ns - pair[0].stamp_ns);
         let longest_s = gaps_ns.max().unwrap_or_default() as f64 * 1e-9;
         // 60 m at up to 8 m/s.
         assert!((7.0..20.0).contains(&longest_s), "{longest_s}");

@@ -199,15 +199,17 @@ impl Simulator {
     /// The rows of the log of a sensor beside the radar.
     pub(crate) fn records(&self, kind: &Kind) -> Option<Vec<Record>> {
         let (config, path) = (&self.config, self.path());
-        let device = match kind.samples {
-            Some(SampleKind::Gyro) => {
+        let device = match kind.of {
+            SampleKind::Gyro => {
                 let nods = config.effects.elevation;
                 let pitch_roll = nods.then(|| PitchRoll::new(config.sensor_seed()));
                 let vehicle = Vehicle::new(path, self.world.relief(), pitch_roll);
                 gyro::device(&config.gyro, config.gyro_seed(), vehicle)
             }
-            Some(SampleKind::Wheels) => wheels::device(&config.wheels, config.wheels_seed(), path),
-            None => gnss::device(&config.gnss, &config.tunnels, config.gnss_seed(), path),
+            SampleKind::Wheels => wheels::device(&config.wheels, config.wheels_seed(), path),
+            SampleKind::Gnss => {
+                gnss::device(&config.gnss, &config.tunnels, config.gnss_seed(), path)
+            }
         };
         Some(device?.records(self.span()))
     }

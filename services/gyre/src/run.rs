@@ -15,7 +15,7 @@ use gyre_configuration::{
     with_stored_options,
 };
 use gyre_contract::run::{Ending, Report};
-use gyre_datasets::GnssLog;
+use gyre_datasets::SampleLog;
 use gyre_geometry::samples::GnssKind;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
@@ -365,7 +365,7 @@ fn keep_fixes(configuration: &Configuration, out: &Out) {
         }
         _ => return,
     };
-    let to = GnssLog::of_recording(&record.file);
+    let to = SampleLog::of_recording(&record.file);
     let kept = rows.and_then(|rows| Ok(storage::write(&to, rows)?));
     if let Err(error) = kept {
         print::note(format_args!(

@@ -56,7 +56,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let mut dataset = source::open(launch, &config, open)?;
     let (gyro, wheels): (GyroConfig, WheelsConfig) =
         (launch.section("gyro")?, launch.section("wheels")?);
-    let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
+    let samples = ScanSamples::open(&[&gyro, &wheels], &config.data, dataset.as_mut());
     let samples = samples.map_err(RunError::input)?;
     play(launch, dataset, samples, Pace::Sensor)
 }

@@ -4,12 +4,8 @@
 use std::{error::Error, path::Path};
 
 use gyre_contract::run::PlayedFrom;
-use gyre_datasets::{
-    Dataset, Fingerprint, GnssLog, OpenError, SampleLog, ScanSamples, check_first_scan,
-};
-use gyre_geometry::samples::{
-    DopplerConfig, GnssKind, GyroConfig, GyroKind, SampleKind, WheelsConfig, WheelsKind,
-};
+use gyre_datasets::{Dataset, Fingerprint, OpenError, SampleLog, ScanSamples, check_first_scan};
+use gyre_geometry::samples::{DopplerConfig, SampleKind, SensorConfig, SensorKind};
 use gyre_simulator::SimulatedDrive;
 
 use crate::configuration::Configuration;
@@ -50,11 +46,11 @@ pub fn open(configuration: &Configuration) -> Result<Played, Failure> {
     };
     check_first(configuration, dataset.as_ref())?;
     check_doppler(&method.doppler, dataset.as_mut())?;
-    let (gyro, wheels) = (&method.gyro, &method.wheels);
+    let sensors = method.sensors();
     Ok(Played {
         samples: match &drive {
-            Some(drive) => simulated_samples(drive, (gyro, wheels), dataset.as_mut())?,
-            None => ScanSamples::open(gyro, wheels, data, dataset.as_mut())?,
+            Some(drive) => simulated_samples(drive, &sensors, dataset.as_mut())?,
+            None => ScanSamples::open(&sensors, data, dataset.as_mut())?,
         },
         dataset,
         truth: drive.map(|drive| drive.ground_truth_tum()),
@@ -85,45 +81,41 @@ fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(
     }
 }
 
-/// Returns the samples that go with the scans of a simulation: of its own gyro and wheels, unless
-/// other logs are named.
+/// Returns the samples that go with the scans of a simulation: of its own sensors, unless other logs
+/// are named.
 pub fn simulated_samples(
     drive: &SimulatedDrive,
-    (gyro, wheels): (&GyroConfig, &WheelsConfig),
+    sensors: &[&dyn SensorConfig],
     dataset: &mut dyn Dataset,
 ) -> Result<ScanSamples, Failure> {
-    let path = Path::new("simulation");
-    let turns = match gyro.kind {
-        GyroKind::Auto => {
-            let Some(samples) = drive.samples(SampleKind::Gyro) else {
-                return refused(
-                    "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\"",
-                );
-            };
-            ScanSamples::of_gyro(&SampleLog::of_gyro(samples, path)?, gyro, dataset)?
+    sensors.iter().try_fold(ScanSamples::None, |all, sensor| {
+        if sensor.kind() != SensorKind::Auto {
+            return Ok(all.and(ScanSamples::open(&[*sensor], Path::new(""), dataset)?));
         }
-        _ => ScanSamples::open(gyro, &WheelsConfig::default(), Path::new(""), dataset)?,
-    };
-    let speeds = match wheels.kind {
-        WheelsKind::Auto => {
-            let Some(samples) = drive.samples(SampleKind::Wheels) else {
-                return refused(
-                    "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\"",
-                );
-            };
-            ScanSamples::of_wheels(&SampleLog::of_wheels(samples, path)?, wheels, dataset)?
-        }
-        _ => ScanSamples::open(&GyroConfig::default(), wheels, Path::new(""), dataset)?,
-    };
-    Ok(turns.and(speeds))
+        let of = sensor.of();
+        let none = match of {
+            SampleKind::Gyro => "no gyro: give it one",
+            SampleKind::Wheels => "no wheels that measure: give them a rate",
+            // Fixes travel with no scan.
+            SampleKind::Gnss => return Ok(all),
+        };
+        let Some(samples) = drive.samples(of) else {
+            let of = of.section();
+            return refused(&format!(
+                "{of}.kind is `auto`, but the simulation has {none} in [simulation.{of}], or set {of}.kind = \"none\""
+            ));
+        };
+        let log = SampleLog::of(of, samples.into(), Path::new("simulation"))?;
+        Ok(all.and(ScanSamples::of_log(&log, *sensor, dataset)?))
+    })
 }
 
 /// Returns the log of the fixes that the corrected trajectory is made with, of a run with its
 /// results in `out`; `None` without GNSS.
-pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, Failure> {
+pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<SampleLog>, Failure> {
     let (config, data) = (&configuration.gnss, &configuration.source.data);
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
-    match config.kind == GnssKind::Auto && !is_in_folder {
+    match config.kind == SensorKind::Auto && !is_in_folder {
         true => refused(
             "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\"",
         ),

@@ -18,13 +18,16 @@ mod sample;
 mod wheels;
 mod wheels_config;
 
-pub use config::{GyroConfig, GyroKind, GyroKind as WheelsKind, UpAxis};
+pub use config::{
+    GyroConfig, SensorConfig, SensorKind, SensorKind as GnssKind, SensorKind as GyroKind,
+    SensorKind as WheelsKind, UpAxis,
+};
 pub use doppler::{DopplerConfig, DopplerDisplacement, DopplerKind, DopplerVelocity};
 pub use geodesy::{Geographic, LocalPlane};
-pub use gnss::{BagFixes, GnssConfig, GnssFix, GnssKind, RawFix};
+pub use gnss::{GnssConfig, GnssFix};
 pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
 pub use integral::interval_of;
 pub use live::{LiveSamples, LiveSensor};
-pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
+pub use sample::{Logged, MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
 pub use wheels::{WheelDistance, Wheels};
 pub use wheels_config::WheelsConfig;

@@ -22,52 +22,51 @@ use crate::{config::SimulationConfig, path::Path};
 const CATCH_UP_NS: i64 = 100_000;
 
 pub struct Kind {
-    /// The samples of this kind that travel with scans, if they do.
-    pub samples: Option<SampleKind>,
+    pub of: SampleKind,
     /// The log beside the scans, and its first row.
     pub file: &'static str,
     pub header: &'static str,
+    /// The value of a sample in each column after the stamp.
+    columns: &'static [usize],
     /// Builds the sensor of a drive along a path; `None` if the drive has no such sensor.
     device: for<'a> fn(&SimulationConfig, &'a dyn Path) -> Option<Device<'a>>,
 }
 
 pub const KINDS: [Kind; 3] = [
     Kind {
-        samples: Some(SampleKind::Gyro),
+        of: SampleKind::Gyro,
         file: "imu.csv",
         // As in the log of RADIATE.
         header: "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2",
+        columns: &[0, 1, 2, 3, 4, 5],
         device: gyro::device,
     },
     Kind {
-        samples: Some(SampleKind::Wheels),
+        of: SampleKind::Wheels,
         file: "wheels.csv",
         header: "stamp_ns,speed_m_s",
+        columns: &[0],
         device: wheels::device,
     },
     Kind {
-        samples: None,
+        of: SampleKind::Gnss,
         file: "gnss.csv",
         header: "stamp_ns,latitude_deg,longitude_deg,sigma_m",
+        columns: &[0, 1, 3],
         device: gnss::device,
     },
 ];
 
-/// The stamp of a sample, ns since 1970, and its values in the order of the columns of the log.
+/// The stamp of a sample, ns since 1970, and its values as [`SampleKind`] names them.
 pub type Record = (i64, [f64; 6]);
 
-/// The samples of a kind that travel with scans, by the records of its row.
+/// The samples of a kind, by the records of its row.
 pub fn samples(
     kind: SampleKind,
     records: impl FnOnce(&Kind) -> Option<Vec<Record>>,
 ) -> Option<Vec<Sample>> {
-    let row = KINDS.iter().find(|row| row.samples == Some(kind))?;
-    let sample = |(stamp_ns, values)| Sample {
-        stamp_ns,
-        kind: kind as u32,
-        reserved: 0,
-        values,
-    };
+    let row = KINDS.iter().find(|row| row.of == kind)?;
+    let sample = |(stamp_ns, values)| Sample::of(kind, stamp_ns, values);
     Some(records(row)?.into_iter().map(sample).collect())
 }
 
@@ -85,11 +84,10 @@ impl Kind {
 
     pub fn csv(&self, records: &[Record]) -> String {
         let mut text = format!("{}\n", self.header);
-        let columns = self.header.matches(',').count();
         for (stamp_ns, values) in records {
             let _ = write!(text, "{stamp_ns}");
-            for value in &values[..columns] {
-                let _ = write!(text, ",{value}");
+            for column in self.columns {
+                let _ = write!(text, ",{}", values[*column]);
             }
             text.push('\n');
         }

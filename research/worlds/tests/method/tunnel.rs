@@ -85,13 +85,15 @@ fn with(
     let (mut samples, path) = (ScanSamples::None, Path::new("simulation"));
     if gyro {
         config.gyro.kind = GyroKind::Auto;
-        let log = SampleLog::of_gyro(drive.samples(SampleKind::Gyro).unwrap(), path).unwrap();
-        samples = ScanSamples::of_gyro(&log, &config.gyro, dataset).unwrap();
+        let gyro = drive.samples(SampleKind::Gyro).unwrap().into();
+        let log = SampleLog::of(SampleKind::Gyro, gyro, path).unwrap();
+        samples = ScanSamples::of_log(&log, &config.gyro, dataset).unwrap();
     }
     if wheels {
         config.wheels.kind = WheelsKind::Auto;
-        let log = SampleLog::of_wheels(drive.samples(SampleKind::Wheels).unwrap(), path).unwrap();
-        samples = samples.and(ScanSamples::of_wheels(&log, &config.wheels, dataset).unwrap());
+        let wheels = drive.samples(SampleKind::Wheels).unwrap().into();
+        let log = SampleLog::of(SampleKind::Wheels, wheels, path).unwrap();
+        samples = samples.and(ScanSamples::of_log(&log, &config.wheels, dataset).unwrap());
     }
     (config, samples)
 }
@@ -183,7 +185,7 @@ fn through(motions: &[(OdometryMotion, Pose, Pose, InitialGuess)]) -> Through {
         end_m = off.xy().norm();
         composed = Some(next);
     }
-    let composed = composed.unwrap().motion;
+    let composed = composed.unwrap().motion();
     let slid = |it: &&(OdometryMotion, Pose, Pose, InitialGuess)| it.3 == InitialGuess::AlongWalls;
     Through {
         end_m,

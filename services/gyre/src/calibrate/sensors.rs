@@ -1,25 +1,23 @@
 //! The sensors beside the scans of a drive: their logs, and the radar's findings about them.
 
-use std::path::{Path, PathBuf, absolute};
+use std::path::{PathBuf, absolute};
 
 use gyre_calibration::{Drive, Kind, SensorSettings, calibrate_sensor, kinds};
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
 };
-use gyre_datasets::{LogError, SampleLog};
-use gyre_geometry::samples::{GyroKind, WheelsKind};
+use gyre_datasets::SampleLog;
+use gyre_geometry::samples::SensorKind;
 use gyre_matching::odometry::OdometryConfig;
 
 use super::{CalibrateArguments, Recorded};
 
-/// A kind of sensor: where its settings and its logs are.
+/// A kind of sensor: where its settings are.
 struct Row {
     kind: &'static Kind,
     named: fn(&CalibrateArguments) -> Option<&PathBuf>,
     settings: fn(&OdometryConfig) -> SensorSettings,
-    find: fn(&Path) -> Result<PathBuf, LogError>,
-    read: fn(&Path, &SensorSettings) -> Result<SampleLog, LogError>,
 }
 
 const ROWS: [Row; 2] = [
@@ -28,15 +26,13 @@ const ROWS: [Row; 2] = [
         named: |arguments| arguments.gyro.as_ref(),
         settings: |OdometryConfig { gyro, .. }| SensorSettings {
             is_used: gyro.is_used(),
-            file: gyro.file.clone().filter(|_| gyro.kind == GyroKind::Log),
+            file: gyro.file.clone().filter(|_| gyro.kind == SensorKind::Log),
             up: gyro.up,
             m_per_tick: None,
             delay_s: gyro.delay_s,
             scale: gyro.scale,
             max_gap_s: gyro.max_gap_s,
         },
-        find: SampleLog::find_gyro,
-        read: |file, _| SampleLog::read_gyro(file),
     },
     Row {
         kind: &kinds::WHEELS,
@@ -46,21 +42,19 @@ const ROWS: [Row; 2] = [
             file: wheels
                 .file
                 .clone()
-                .filter(|_| wheels.kind == WheelsKind::Log),
+                .filter(|_| wheels.kind == SensorKind::Log),
             up: None,
             m_per_tick: wheels.m_per_tick,
             delay_s: wheels.delay_s,
             scale: wheels.scale,
             max_gap_s: wheels.max_gap_s,
         },
-        find: SampleLog::find_wheels,
-        read: |file, settings| SampleLog::read_wheels(file, settings.m_per_tick),
     },
 ];
 
 /// Leaves the radar alone: the other sensors are compared with it.
 pub(super) fn leave_out(config: &mut OdometryConfig) {
-    (config.gyro.kind, config.wheels.kind) = (GyroKind::None, WheelsKind::None);
+    (config.gyro.kind, config.wheels.kind) = (SensorKind::None, SensorKind::None);
 }
 
 /// The log of a sensor in a drive.
@@ -100,11 +94,12 @@ impl Sensor {
         let configured = (row.settings)(&configuration.odometry);
         let named = (row.named)(arguments).or(configured.file.as_ref()).cloned();
         let is_named = named.is_some();
-        let beside = || (row.find)(&configuration.source.data).ok();
+        let of = row.kind.sensor;
+        let beside = || SampleLog::find(of, &configuration.source.data).ok();
         let Some(file) = named.or_else(beside) else {
             return Ok(None);
         };
-        match (row.read)(&file, &configured) {
+        match SampleLog::read(of, &file, configured.m_per_tick) {
             Ok(log) => Ok(Some(Self {
                 kind: row.kind,
                 log,

@@ -25,7 +25,7 @@ use std::{
 
 use gyre_geometry::{
     OwnedScan,
-    samples::{BagFixes, Sample, SampleKind},
+    samples::{Logged, Sample, SampleKind},
     scan::{ScanLimits, ScanSlot, SweepGeometry},
 };
 use gyre_radar::{NoDoppler, check_chirps};
@@ -159,19 +159,8 @@ pub trait Dataset: Send {
     /// Reads the samples of another sensor that the recording itself has, on the topic of this
     /// name, else on the only one: in the sensor's own axes and on its own clock, in the order of
     /// the recording. `None` without one.
-    fn logged(
-        &mut self,
-        of: SampleKind,
-        topic: Option<&str>,
-    ) -> Result<Option<Vec<Sample>>, OpenError> {
+    fn logged(&mut self, of: SampleKind, topic: Option<&str>) -> Result<Option<Logged>, OpenError> {
         let _ = (of, topic);
-        Ok(None)
-    }
-
-    /// Reads the fixes of a GNSS receiver that the recording itself has, on the topic of this name,
-    /// else on the only one. `None` without one.
-    fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
-        let _ = topic;
         Ok(None)
     }
 

@@ -11,7 +11,7 @@ use gyre_geometry::Pose;
 use gyre_radar::trajectory::Trajectory;
 use gyre_storage::quoted;
 
-use crate::logs::roots;
+use crate::sample_log::roots;
 
 /// Files of ground truth relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 9] = [

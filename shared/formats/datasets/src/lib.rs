@@ -3,16 +3,13 @@
 
 pub mod dataset;
 pub mod fingerprint;
-mod gnss_log;
 pub mod ground_truth;
-mod gyro_log;
 mod header;
 mod inspect;
-mod logs;
 mod plain_words;
+mod sample_log;
 mod scan_samples;
 mod table;
-mod wheel_log;
 
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, Format,
@@ -21,12 +18,10 @@ pub use dataset::{
     open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
-pub use gnss_log::{GnssFaults, GnssLog, LoggedFix, ReceivedFixes};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
-pub use gyro_log::{LogFaults, LogGap, SampleLog};
 pub use inspect::{InspectedLogs, Report, inspect, inspect_dataset};
-pub use logs::LogError;
 pub use plain_words::{clipped, in_plain_words};
+pub use sample_log::{LogError, LogFaults, LogGap, ReceivedFixes, SampleLog};
 pub use scan_samples::ScanSamples;

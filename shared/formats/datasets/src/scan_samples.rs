@@ -2,14 +2,12 @@
 
 use std::{borrow::Cow, path::Path};
 
-use gyre_geometry::samples::{
-    GyroConfig, GyroKind, Sample, SampleKind, WheelsConfig, WheelsKind, interval_of,
-};
+use gyre_geometry::samples::{Sample, SampleKind, SensorConfig, SensorKind, interval_of};
 
 use crate::{
     LogError, SampleLog,
     dataset::{Dataset, Format},
-    gyro_log::{LogFaults, jumps},
+    sample_log::jumps,
 };
 
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
@@ -25,78 +23,62 @@ pub enum ScanSamples {
 }
 
 impl ScanSamples {
-    /// Opens the logs in the sections `[gyro]` and `[wheels]` for the dataset in this folder, or
+    /// Opens the logs that the sections of these sensors name, for the dataset in this folder, or
     /// for this bag.
     pub fn open(
-        gyro: &GyroConfig,
-        wheels: &WheelsConfig,
+        sensors: &[&dyn SensorConfig],
         folder: &Path,
         dataset: &mut dyn Dataset,
     ) -> Result<Self, LogError> {
         if dataset.format() == Format::Mcap {
-            return Ok(Self::recorded(gyro, wheels));
+            let used = sensors.iter().filter(|sensor| sensor.kind().is_used());
+            let used: Vec<SampleKind> = used.map(|sensor| sensor.of()).collect();
+            return Ok(match used.is_empty() {
+                true => Self::None,
+                false => Self::Recorded(used),
+            });
         }
-        let live = |of: SampleKind| Err(LogError::Live { of: of.section() });
-        let turns = match gyro.kind {
-            GyroKind::None => None,
-            GyroKind::Udp | GyroKind::Ros2 => return live(SampleKind::Gyro),
-            GyroKind::Log => Some(SampleLog::read_gyro(
-                &gyro.file.clone().unwrap_or_default(),
-            )?),
-            GyroKind::Auto => Some(
-                match dataset.logged(SampleKind::Gyro, gyro.topic.as_deref())? {
-                    Some(samples) => SampleLog::of_gyro(samples, folder)?,
-                    None => SampleLog::read_gyro(&SampleLog::find_gyro(folder)?)?,
-                },
-            ),
-        };
-        let read = |file: &Path| SampleLog::read_wheels(file, wheels.m_per_tick);
-        let speeds = match wheels.kind {
-            WheelsKind::None => None,
-            WheelsKind::Udp | WheelsKind::Ros2 => return live(SampleKind::Wheels),
-            WheelsKind::Log => Some(read(&wheels.file.clone().unwrap_or_default())?),
-            WheelsKind::Auto => Some(
-                match dataset.logged(SampleKind::Wheels, wheels.topic.as_deref())? {
-                    Some(samples) => SampleLog::of_wheels(samples, folder)?,
-                    None => read(&SampleLog::find_wheels(folder)?)?,
-                },
-            ),
-        };
-        let mut all = Self::None;
-        if let Some(log) = turns {
-            all = Self::of_gyro(&log, gyro, dataset)?;
-        }
-        if let Some(log) = speeds {
-            all = all.and(Self::of_wheels(&log, wheels, dataset)?);
-        }
-        Ok(all)
+        sensors.iter().try_fold(Self::None, |all, sensor| {
+            Ok(match log(*sensor, folder, dataset)? {
+                Some(log) => all.and(Self::of_log(&log, *sensor, dataset)?),
+                None => all,
+            })
+        })
     }
 
-    pub fn of_gyro(
+    /// Takes the samples of a log over to the radar's clock and the vehicle's axes.
+    pub fn of_log(
         log: &SampleLog,
-        config: &GyroConfig,
+        sensor: &dyn SensorConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
-        let config = GyroConfig {
-            up: Some(log.up(config.up, dataset.format())?),
-            ..config.clone()
+        let up = match log.of {
+            SampleKind::Gyro => Some(log.up(sensor.up(), dataset.format())?),
+            _ => None,
         };
-        let samples = log.samples.iter().map(|it| config.on_radar(it)).collect();
-        Self::of_samples(samples, (SampleKind::Gyro, &log.path), &log.faults, dataset)
-    }
-
-    pub fn of_wheels(
-        log: &SampleLog,
-        config: &WheelsConfig,
-        dataset: &dyn Dataset,
-    ) -> Result<Self, LogError> {
-        let samples = log.samples.iter().map(|it| config.on_radar(it)).collect();
-        Self::of_samples(
-            samples,
-            (SampleKind::Wheels, &log.path),
-            &log.faults,
-            dataset,
-        )
+        let samples = log.samples.iter().map(|it| sensor.on_radar(it, up));
+        let mut samples: Vec<Sample> = samples.collect();
+        let last = dataset.len().saturating_sub(1);
+        let [first_ns, last_ns] =
+            [dataset.first(), last].map(|index| dataset.nominal_stamp_ns(index));
+        if let (Some(first_ns), Some(last_ns), Some(begin)) = (first_ns, last_ns, samples.first())
+            && between(&samples, first_ns, last_ns).is_empty()
+        {
+            let (of, path, faults) = (log.of.section(), log.path.display(), &log.faults);
+            let after_s = (begin.stamp_ns - first_ns) as f64 * 1e-9;
+            let steps = match faults.clock_steps_s.is_empty() {
+                true => String::new(),
+                false => format!("{}. ", faults.clock_steps()),
+            };
+            return Err(LogError::Unusable(format!(
+                "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of a different drive, or {of}.delay_s is wrong"
+            )));
+        }
+        let named = |sentence| format!("{}: {sentence}", log.path.display());
+        let jumps = jumps::leave_out(&mut samples, log.of).sentence();
+        let faults = log.sentences().into_iter().chain(jumps);
+        let faults = faults.map(named).collect();
+        Ok(Self::Log { samples, faults })
     }
 
     #[must_use]
@@ -137,45 +119,6 @@ impl ScanSamples {
         }
     }
 
-    fn recorded(gyro: &GyroConfig, wheels: &WheelsConfig) -> Self {
-        let gyro = gyro.is_used().then_some(SampleKind::Gyro);
-        let wheels = wheels.is_used().then_some(SampleKind::Wheels);
-        let used: Vec<SampleKind> = gyro.into_iter().chain(wheels).collect();
-        match used.is_empty() {
-            true => Self::None,
-            false => Self::Recorded(used),
-        }
-    }
-
-    fn of_samples(
-        mut samples: Vec<Sample>,
-        (of, path): (SampleKind, &Path),
-        faults: &LogFaults,
-        dataset: &dyn Dataset,
-    ) -> Result<Self, LogError> {
-        let last = dataset.len().saturating_sub(1);
-        let [first_ns, last_ns] =
-            [dataset.first(), last].map(|index| dataset.nominal_stamp_ns(index));
-        if let (Some(first_ns), Some(last_ns), Some(begin)) = (first_ns, last_ns, samples.first())
-            && between(&samples, first_ns, last_ns).is_empty()
-        {
-            let (of, path) = (of.section(), path.display());
-            let after_s = (begin.stamp_ns - first_ns) as f64 * 1e-9;
-            let steps = match faults.clock_steps_s.is_empty() {
-                true => String::new(),
-                false => format!("{}. ", faults.clock_steps()),
-            };
-            return Err(LogError::Unusable(format!(
-                "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of a different drive, or {of}.delay_s is wrong"
-            )));
-        }
-        let named = |sentence| format!("{}: {sentence}", path.display());
-        let jumps = jumps::leave_out(&mut samples, of).sentence();
-        let faults = faults.sentences(of).into_iter().chain(jumps);
-        let faults = faults.map(named).collect();
-        Ok(Self::Log { samples, faults })
-    }
-
     /// Returns a sentence for each kind of fault in the logs, as of samples that are left out.
     pub fn faults(&self) -> &[String] {
         match self {
@@ -204,6 +147,25 @@ impl ScanSamples {
     }
 }
 
+/// Reads the log that the section of a sensor names; `None` if the sensor is not used.
+fn log(
+    sensor: &dyn SensorConfig,
+    folder: &Path,
+    dataset: &mut dyn Dataset,
+) -> Result<Option<SampleLog>, LogError> {
+    let of = sensor.of();
+    let read = |file: &Path| SampleLog::read(of, file, sensor.m_per_tick()).map(Some);
+    match sensor.kind() {
+        SensorKind::None => Ok(None),
+        SensorKind::Udp | SensorKind::Ros2 => Err(LogError::Live { of }),
+        SensorKind::Log => read(sensor.file()),
+        SensorKind::Auto => match dataset.logged(of, sensor.topic())? {
+            Some(logged) => SampleLog::of(of, logged, folder).map(Some),
+            None => read(&SampleLog::find(of, folder)?),
+        },
+    }
+}
+
 /// Returns the samples with stamps after one time and up to another, which is included.
 fn between(samples: &[Sample], after_ns: i64, until_ns: i64) -> &[Sample] {
     let up_to = |ns| samples.partition_point(|sample| sample.stamp_ns <= ns);
@@ -214,6 +176,7 @@ fn between(samples: &[Sample], after_ns: i64, until_ns: i64) -> &[Sample] {
 
 #[cfg(test)]
 mod tests {
+    use gyre_geometry::samples::GyroConfig;
     use gyre_geometry::samples::UpAxis::{MinusX, MinusY, MinusZ, X, Y, Z};
     use nalgebra::Vector3;
     use proptest::prelude::*;
@@ -270,7 +233,6 @@ mod tests {
             values: [0.1, 0.2, -0.3, 1.0, 2.0, -9.8],
             ..Sample::yaw_rate(5_000_000_000, 0.0)
         };
-        let log = SampleLog::of_gyro(vec![sample], Path::new("log")).unwrap();
         let config = GyroConfig {
             delay_s: 1.58,
             up: Some(MinusZ),
@@ -278,7 +240,7 @@ mod tests {
             bias_radps: 0.5,
             ..GyroConfig::default()
         };
-        let sample = config.on_radar(&log.samples[0]);
+        let sample = config.on_radar(&sample, None);
         assert_eq!(sample.stamp_ns, 3_420_000_000);
         assert_eq!(sample.values, [0.1, -0.2, 0.3 * 1.01, 1.0, -2.0, 9.8]);
     }

@@ -4,9 +4,13 @@
 use std::{iter, ops::Range};
 
 use csv::StringRecord;
+use gyre_geometry::samples::Sample;
 use gyre_storage::quoted;
 
-use crate::header::Header;
+use crate::{
+    header::Header,
+    sample_log::{Columns, kinds::Kind},
+};
 
 /// The largest file: a day of samples at 200 Hz has 2 GB.
 pub(crate) const MAX_BYTES: u64 = 4 << 30;
@@ -15,38 +19,19 @@ const MARKS: [u8; 3] = [b',', b';', b'\t'];
 /// The first field of a row that replaces unreadable rows; the second field is their number.
 const UNREADABLE: &str = "unreadable";
 
-pub(crate) trait Columns: Sized {
-    type Entry;
-
-    fn by_names(header: &Header) -> Result<Self, String>;
-
-    /// Finds the columns of a table without names, by their number.
-    fn by_number(columns: usize) -> Result<Self, String> {
-        Err(format!(
-            "its {columns} columns have no names: the first row must name them"
-        ))
-    }
-
-    /// Reads a row; `None` if a field is missing or no number. `nan` is one.
-    fn entry(&self, row: &StringRecord) -> Option<Self::Entry>;
-
-    fn is_unmeasured(&self, _row: &StringRecord) -> bool {
-        false
-    }
-}
-
 #[derive(Clone)]
-pub(crate) struct Rows<C: Columns> {
-    pub columns: C,
-    pub raw: Raw<C::Entry>,
+pub(crate) struct Rows {
+    kind: &'static Kind,
+    pub columns: Columns,
+    pub raw: Raw,
     stating: Vec<(usize, f64)>,
     count: usize,
     mark: u8,
     lines: usize,
 }
 
-impl<C: Columns> Rows<C> {
-    pub fn of(text: &str) -> Result<Self, String> {
+impl Rows {
+    pub fn of(text: &str, kind: &'static Kind) -> Result<Self, String> {
         let first = text.lines().next().unwrap_or_default().as_bytes();
         let mark = MARKS.into_iter().find(|mark| first.contains(mark));
         let mark = mark.unwrap_or(b',');
@@ -59,16 +44,17 @@ impl<C: Columns> Rows<C> {
         let (columns, stating) = match is_named {
             true => {
                 let header = Header::of(&row)?;
-                (C::by_names(&header)?, header.unmeasured())
+                ((kind.by_names)(&header)?, header.unmeasured())
             }
-            false => (C::by_number(row.len())?, Vec::new()),
+            false => ((kind.by_number)(row.len())?, Vec::new()),
         };
         let mut rows = Self {
+            kind,
             columns,
             stating,
             mark,
             count: row.len(),
-            raw: Raw::of(Vec::new()),
+            raw: Raw::default(),
             lines: 0,
         };
         // Without names the first row is an entry.
@@ -96,12 +82,12 @@ impl<C: Columns> Rows<C> {
             let text = row.get(*column).unwrap_or_default();
             text.eq_ignore_ascii_case("false") || text.parse() == Ok(*number)
         };
-        match self.columns.entry(row).filter(|_| row.len() == self.count) {
+        let (kind, is_whole) = (self.kind, row.len() == self.count);
+        let is_blank = || kind.has_blanks && self.columns.are_blank(kind.values, row);
+        match self.columns.read(row).filter(|_| is_whole) {
             Some(_) if self.stating.iter().any(states_so) => self.raw.unmeasured += 1,
-            Some(entry) => self.raw.entries.push(entry),
-            None if row.len() == self.count && self.columns.is_unmeasured(row) => {
-                self.raw.unmeasured += 1;
-            }
+            Some((stamp_ns, values)) => self.raw.entries.push((kind.sample)(stamp_ns, values)),
+            None if is_whole && is_blank() => self.raw.unmeasured += 1,
             None => {
                 let line = self.lines + row.position().map_or(0, |at| at.line() as usize);
                 let times = row.get(1).filter(|_| row.get(0) == Some(UNREADABLE));
@@ -129,23 +115,15 @@ pub(crate) fn leave_out<T>(entries: &mut Vec<T>, is_bad: impl Fn(&T) -> bool) ->
     before - entries.len()
 }
 
-#[derive(Clone, Debug)]
-pub(crate) struct Raw<T> {
-    pub entries: Vec<T>,
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Raw {
+    pub entries: Vec<Sample>,
     pub unreadable: Unreadable,
     /// Rows or messages that state that nothing was measured.
     pub unmeasured: usize,
 }
 
-impl<T> Raw<T> {
-    pub fn of(entries: Vec<T>) -> Self {
-        Self {
-            entries,
-            unreadable: Unreadable::default(),
-            unmeasured: 0,
-        }
-    }
-
+impl Raw {
     /// All entries, those that cannot be used too.
     pub fn count(&self) -> usize {
         (self.entries.len() + self.unmeasured).saturating_add(self.unreadable.count)

@@ -4,9 +4,8 @@
 
 mod common;
 
-mod gnss_logs;
-mod gyro_logs;
 mod inspect;
 mod real_scans;
+mod sample_logs;
 mod trajectories;
 mod written_scans;

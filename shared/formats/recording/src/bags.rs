@@ -18,5 +18,5 @@ use crate::{
 
 pub use files::is_bag;
 pub use scans::{open, reopen};
-pub use sensors::fixes;
+pub use sensors::logged;
 pub use writer::{BagWriter, Kept, Topic};

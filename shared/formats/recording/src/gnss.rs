@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_datasets::{GnssLog, LogError};
-use gyre_geometry::samples::{GnssConfig, GnssKind};
+use gyre_datasets::{LogError, SampleLog};
+use gyre_geometry::samples::{GnssConfig, SampleKind, SensorConfig, SensorKind};
 
 use crate::{
     bags::{self, is_bag},
     parts::first_part_in,
 };
+
+const OF: SampleKind = SampleKind::Gnss;
 
 /// Returns the path of the log of a live receiver during the run with its results in `out`.
 pub fn received_fixes(out: &Path) -> PathBuf {
@@ -17,12 +19,16 @@ pub fn received_fixes(out: &Path) -> PathBuf {
 
 /// Reads the log that the section `[gnss]` names for the scans at `data`; for a live receiver, its
 /// log so far during the run with its results in `out`; `None` without GNSS.
-pub fn gnss_log(config: &GnssConfig, data: &Path, out: &Path) -> Result<Option<GnssLog>, LogError> {
+pub fn gnss_log(
+    config: &GnssConfig,
+    data: &Path,
+    out: &Path,
+) -> Result<Option<SampleLog>, LogError> {
     match config.kind {
-        GnssKind::None => Ok(None),
-        GnssKind::Auto => of_scans(config.topic.as_deref(), data).map(Some),
-        GnssKind::Log => GnssLog::read(&config.file.clone().unwrap_or_default()).map(Some),
-        GnssKind::Udp | GnssKind::Ros2 => Ok(Some(GnssLog::received(&received_fixes(out)))),
+        SensorKind::None => Ok(None),
+        SensorKind::Auto => of_scans(config.topic(), data).map(Some),
+        SensorKind::Log => read(config.file()).map(Some),
+        SensorKind::Udp | SensorKind::Ros2 => Ok(Some(SampleLog::received(&received_fixes(out)))),
     }
 }
 
@@ -30,20 +36,24 @@ pub fn gnss_log(config: &GnssConfig, data: &Path, out: &Path) -> Result<Option<G
 /// recording of the run.
 pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, LogError> {
     let in_bag = match is_bag(data) {
-        true => bags::fixes(data, config.topic.as_deref())?,
+        true => bags::logged(data, OF, config.topic())?,
         false => None,
     };
     match in_bag {
-        Some(found) => Ok(GnssLog::table(&found.fixes, false)),
+        Some(found) => Ok(SampleLog::table_of_fixes(&found.samples, false)),
         None => {
             let first = first_part_in(data).unwrap_or_else(|| data.to_owned());
-            GnssLog::copy_of(&GnssLog::find(&first)?)
+            SampleLog::copy_of_fixes(&SampleLog::find(OF, &first)?)
         }
     }
 }
 
+fn read(path: &Path) -> Result<SampleLog, LogError> {
+    SampleLog::read(OF, path, None)
+}
+
 /// Reads the fixes in the bag, else the log beside the scans.
-fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, LogError> {
+fn of_scans(topic: Option<&str>, data: &Path) -> Result<SampleLog, LogError> {
     let shown = data.display();
     let none_in_bag = |_| {
         LogError::Unusable(format!(
@@ -51,17 +61,17 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, LogError> {
         ))
     };
     match (is_bag(data), topic) {
-        (true, _) => match bags::fixes(data, topic)? {
-            Some(fixes) => GnssLog::of(fixes, data),
-            None => GnssLog::read(&GnssLog::find(data).map_err(none_in_bag)?),
+        (true, _) => match bags::logged(data, OF, topic)? {
+            Some(fixes) => SampleLog::of(OF, fixes, data),
+            None => read(&SampleLog::find(OF, data).map_err(none_in_bag)?),
         },
         (false, None) => {
             let first = first_part_in(data).unwrap_or_else(|| data.to_owned());
-            let path = GnssLog::find(&first)?;
+            let path = SampleLog::find(OF, &first)?;
             // A live receiver may have sent nothing that can be used.
-            match path == GnssLog::of_recording(&first) {
-                true => Ok(GnssLog::received(&path)),
-                false => GnssLog::read(&path),
+            match path == SampleLog::of_recording(&first) {
+                true => Ok(SampleLog::received(&path)),
+                false => read(&path),
             }
         }
         (false, Some(topic)) => Err(LogError::Unusable(format!(
@@ -78,7 +88,7 @@ mod tests {
 
     fn auto(topic: Option<&str>) -> GnssConfig {
         GnssConfig {
-            kind: GnssKind::Auto,
+            kind: SensorKind::Auto,
             topic: topic.map(str::to_owned),
             ..GnssConfig::default()
         }
@@ -96,14 +106,17 @@ mod tests {
         let log = |config: &GnssConfig| gnss_log(config, folder.path(), out).unwrap();
         assert_eq!(log(&auto(None)).unwrap().path, beside);
         let config = GnssConfig {
-            kind: GnssKind::Log,
+            kind: SensorKind::Log,
             file: Some(named.clone()),
             ..GnssConfig::default()
         };
         assert_eq!(log(&config).unwrap().path, named);
         let copy = copied_fixes(&auto(None), folder.path()).unwrap();
         fs::write(&named, copy).unwrap();
-        assert_eq!(log(&config).unwrap().fixes, log(&auto(None)).unwrap().fixes);
+        assert_eq!(
+            log(&config).unwrap().samples,
+            log(&auto(None)).unwrap().samples
+        );
         assert!(log(&GnssConfig::default()).is_none());
     }
 
@@ -112,7 +125,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let recording = folder.path().join("drive.mcap");
         fs::write(&recording, "").unwrap();
-        let own = GnssLog::of_recording(&recording);
+        let own = SampleLog::of_recording(&recording);
         fs::write(&own, "stamp_ns,latitude_deg,longitude_deg,sigma_m\n7,,,0\n").unwrap();
         let beside = folder.path().join("gnss.csv");
         fs::write(beside, "stamp_s,east_m,north_m\n7,1,2\n").unwrap();

@@ -1,6 +1,6 @@
 //! `sensor_msgs`: images, and the measurements of inertial sensors and GNSS receivers.
 
-use gyre_geometry::samples::{RawFix, Sample, SampleKind};
+use gyre_geometry::samples::{Sample, SampleKind};
 
 use crate::{
     definition::package,
@@ -86,12 +86,8 @@ impl Imu {
         let [x, y, z] = values(self.angular_velocity, covariance, f64::NAN);
         let covariance = self.linear_acceleration_covariance;
         let [along_x, along_y, along_z] = values(self.linear_acceleration, covariance, 0.0);
-        Sample {
-            stamp_ns: self.header.stamp_or(received_ns),
-            kind: SampleKind::Gyro as u32,
-            reserved: 0,
-            values: [x, y, z, along_x, along_y, along_z],
-        }
+        let values = [x, y, z, along_x, along_y, along_z];
+        Sample::of(SampleKind::Gyro, self.header.stamp_or(received_ns), values)
     }
 }
 
@@ -104,19 +100,19 @@ const COVARIANCE_UNKNOWN: u8 = 0;
 impl NavSatFix {
     /// Returns the fix on the driver's clock ([`Header::stamp_or`]); `None` if the receiver had
     /// none.
-    pub fn fix(&self, received_ns: i64) -> Option<RawFix> {
+    pub fn fix(&self, received_ns: i64) -> Option<Sample> {
         let sigma_m = match self.position_covariance_type {
             COVARIANCE_UNKNOWN => 0.0,
-            _ => RawFix::sigma_of([0, 4].map(|at| self.position_covariance[at])),
+            _ => Sample::sigma_of([0, 4].map(|at| self.position_covariance[at])),
         };
+        let (stamp_ns, at) = (
+            self.header.stamp_or(received_ns),
+            [self.latitude, self.longitude],
+        );
+        let mut fix = Sample::fix(stamp_ns, at, self.altitude, sigma_m);
         let status_is_unknown = self.status.status == STATUS_UNKNOWN;
-        (self.status.status >= FIX || status_is_unknown).then_some(RawFix {
-            stamp_ns: self.header.stamp_or(received_ns),
-            at: [self.latitude, self.longitude],
-            altitude_m: self.altitude,
-            sigma_m,
-            status_is_unknown,
-        })
+        fix.values[4] = f64::from(status_is_unknown);
+        (self.status.status >= FIX || status_is_unknown).then_some(fix)
     }
 
     /// Returns the line that a live receiver would send: its time, ns, latitude and longitude,
@@ -124,8 +120,8 @@ impl NavSatFix {
     pub fn line(&self, received_ns: i64) -> String {
         match self.fix(received_ns) {
             Some(fix) => {
-                let (stamp_ns, [latitude, longitude]) = (fix.stamp_ns, fix.at);
-                format!("{stamp_ns},{latitude},{longitude},{}", fix.sigma_m)
+                let (stamp_ns, [latitude, longitude, _, sigma_m, ..]) = (fix.stamp_ns, fix.values);
+                format!("{stamp_ns},{latitude},{longitude},{sigma_m}")
             }
             None => format!("{},,", self.header.stamp_or(received_ns)),
         }

@@ -1,6 +1,6 @@
 //! Messages as bytes.
 
-use gyre_geometry::samples::RawFix;
+use gyre_geometry::samples::Sample;
 use gyre_ros2_messages::{
     Ros2Message, decode, encode,
     geometry_msgs::Quaternion,
@@ -122,13 +122,8 @@ fn a_fix_of_another_writer_is_read_and_written_alike() {
     let place = [fix.latitude, fix.longitude, fix.altitude];
     assert_eq!(place, [51.75, -1.26, 64.5]);
     assert_eq!(fix.position_covariance_type, 3);
-    let expected = RawFix {
-        stamp_ns: 1_549_986_608_000_000_007,
-        at: [51.75, -1.26],
-        altitude_m: 64.5,
-        sigma_m: 6.5_f64.sqrt(),
-        status_is_unknown: false,
-    };
+    let stamp_ns = 1_549_986_608_000_000_007;
+    let expected = Sample::fix(stamp_ns, [51.75, -1.26], 64.5, 6.5_f64.sqrt());
     assert_eq!(fix.fix(5), Some(expected));
     let line = format!("1549986608000000007,51.75,-1.26,{}", 6.5_f64.sqrt());
     assert_eq!(fix.line(5), line);
@@ -143,7 +138,7 @@ fn a_receiver_without_a_fix_or_an_accuracy_says_so() {
         assert_eq!(fix.fix(5).is_some(), has_fix, "{status}");
     }
     fix.position_covariance_type = 0;
-    assert_eq!(fix.fix(5).unwrap().sigma_m, 0.0);
+    assert_eq!(fix.fix(5).unwrap().sigma_m(), None);
     (fix.status.status, fix.header) = (-1, Header::default());
     assert_eq!(fix.line(5), "5,,");
 }

@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT},
     check_bounds,
-    samples::Sample,
+    samples::{Sample, SampleKind},
 };
 
 /// Least standard deviation of a scale: an axis leans by up to 8 degrees, in bends and on slopes.
@@ -19,7 +19,7 @@ const LEANING: f64 = 0.01;
 #[serde(default, deny_unknown_fields)]
 pub struct GyroConfig {
     /// Whose yaw rate is used.
-    pub kind: GyroKind,
+    pub kind: SensorKind,
     /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -56,22 +56,102 @@ pub struct GyroConfig {
     pub max_gap_s: f64,
 }
 
-/// Whose yaw rate, or speed of wheels, is used.
+/// Whose samples of a sensor beside the radar are used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum GyroKind {
+pub enum SensorKind {
     /// None: by the radar alone.
     #[default]
     None,
-    /// The log beside the scans, or the samples that come with them; without either it is an error.
+    /// The samples that come with the scans, else the log that lies beside them; without either it is
+    /// an error.
     Auto,
     /// The log that `file` names.
     Log,
     /// Of a live radar: what arrives in datagrams at `listen`.
     Udp,
-    /// Of a live radar behind its driver in ROS 2: `topic`.
+    /// Of a live radar behind its driver in ROS 2: the messages on `topic`.
     Ros2,
 }
+
+impl SensorKind {
+    pub fn is_used(self) -> bool {
+        self != Self::None
+    }
+
+    /// Returns whether the sensor is live: its samples arrive while the radar is received.
+    pub fn is_live(self) -> bool {
+        matches!(self, Self::Udp | Self::Ros2)
+    }
+}
+
+/// The settings that all sensors beside the radar have.
+pub trait SensorConfig {
+    fn of(&self) -> SampleKind;
+
+    fn kind(&self) -> SensorKind;
+
+    /// The log, for [`SensorKind::Log`].
+    fn file(&self) -> &Path;
+
+    fn topic(&self) -> Option<&str>;
+
+    /// Distance of one tick of a log that counts ticks, m.
+    fn m_per_tick(&self) -> Option<f64> {
+        None
+    }
+
+    /// The axis that points up, if it is configured.
+    fn up(&self) -> Option<UpAxis> {
+        None
+    }
+
+    /// Takes a sample over to the radar's clock and the vehicle's axes. `up` is the axis that points
+    /// up where none is configured.
+    fn on_radar(&self, sample: &Sample, up: Option<UpAxis>) -> Sample;
+}
+
+/// The stamp of a sample on the radar's clock, ns, by the delay of the sensor's.
+pub(super) fn on_clock(sample: &Sample, delay_s: f64) -> i64 {
+    let late_ns = (delay_s * 1e9).round() as i64;
+    sample.stamp_ns.saturating_sub(late_ns)
+}
+
+/// Makes a section with `kind`, `file` and `topic` the settings of a kind of sensor.
+macro_rules! sensor_config {
+    ($config:ident is $of:ident: $($method:item)+) => {
+        impl $config {
+            pub fn is_used(&self) -> bool {
+                self.kind.is_used()
+            }
+
+            pub fn is_live(&self) -> bool {
+                self.kind.is_live()
+            }
+        }
+
+        impl $crate::samples::SensorConfig for $config {
+            fn of(&self) -> $crate::samples::SampleKind {
+                $crate::samples::SampleKind::$of
+            }
+
+            fn kind(&self) -> SensorKind {
+                self.kind
+            }
+
+            fn file(&self) -> &std::path::Path {
+                self.file.as_deref().unwrap_or(std::path::Path::new(""))
+            }
+
+            fn topic(&self) -> Option<&str> {
+                self.topic.as_deref()
+            }
+
+            $($method)+
+        }
+    };
+}
+pub(super) use sensor_config;
 
 /// The axis of a gyro that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -127,7 +207,7 @@ impl UpAxis {
 impl Default for GyroConfig {
     fn default() -> Self {
         Self {
-            kind: GyroKind::None,
+            kind: SensorKind::None,
             file: None,
             topic: None,
             listen: "127.0.0.1:6321".to_owned(),
@@ -147,30 +227,6 @@ impl Default for GyroConfig {
 }
 
 impl GyroConfig {
-    pub fn is_used(&self) -> bool {
-        self.kind != GyroKind::None
-    }
-
-    /// Returns whether the gyro is live: its samples arrive while the radar is received.
-    pub fn is_live(&self) -> bool {
-        matches!(self.kind, GyroKind::Udp | GyroKind::Ros2)
-    }
-
-    /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its
-    /// stamp, the scale is applied to the yaw rate alone, and the bias to nothing.
-    pub fn on_radar(&self, sample: &Sample) -> Sample {
-        let late_ns = (self.delay_s * 1e9).round() as i64;
-        let [x, y, z, along_x, along_y, along_z] = sample.values;
-        let up = self.up.unwrap_or_default();
-        let [roll, pitch, yaw] = up.in_vehicle([x, y, z]);
-        let [ahead, left, above] = up.in_vehicle([along_x, along_y, along_z]);
-        Sample {
-            stamp_ns: sample.stamp_ns.saturating_sub(late_ns),
-            values: [roll, pitch, yaw * self.scale, ahead, left, above],
-            ..*sample
-        }
-    }
-
     /// Returns whether a gyro with these settings can have a learnt scale.
     pub fn allows_scale(&self, scale: f64) -> bool {
         (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
@@ -190,5 +246,25 @@ impl GyroConfig {
             max_gap_s in GAP,
         }
         Ok(())
+    }
+}
+
+sensor_config! { GyroConfig is Gyro:
+    fn up(&self) -> Option<UpAxis> {
+        self.up
+    }
+
+    /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its
+    /// stamp, the scale is applied to the yaw rate alone, and the bias to nothing.
+    fn on_radar(&self, sample: &Sample, up: Option<UpAxis>) -> Sample {
+        let [x, y, z, along_x, along_y, along_z] = sample.values;
+        let up = self.up.or(up).unwrap_or_default();
+        let [roll, pitch, yaw] = up.in_vehicle([x, y, z]);
+        let [ahead, left, above] = up.in_vehicle([along_x, along_y, along_z]);
+        Sample {
+            stamp_ns: on_clock(sample, self.delay_s),
+            values: [roll, pitch, yaw * self.scale, ahead, left, above],
+            ..*sample
+        }
     }
 }

@@ -6,7 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bounds::{DELAY, SettingError, check},
     check_bounds,
-    samples::Geographic,
+    samples::{
+        Sample, SensorKind, UpAxis,
+        config::{on_clock, sensor_config},
+    },
 };
 
 /// Configuration of GNSS: section `[gnss]`.
@@ -17,7 +20,7 @@ use crate::{
 #[serde(default, deny_unknown_fields)]
 pub struct GnssConfig {
     /// Whose fixes are used.
-    pub kind: GnssKind,
+    pub kind: SensorKind,
     /// The log, for `kind = "log"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -40,30 +43,12 @@ pub struct GnssConfig {
     pub correlation_s: f64,
 }
 
-/// Whose fixes are used.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum GnssKind {
-    /// None.
-    #[default]
-    None,
-    /// The fixes in a bag of ROS 2, else the log that lies beside the scans; without either it is
-    /// an error.
-    Auto,
-    /// The log that `file` names.
-    Log,
-    /// Of a live radar: what arrives in datagrams at `listen`.
-    Udp,
-    /// Of a radar behind its driver in ROS 2: the messages on `topic`.
-    Ros2,
-}
-
 impl Default for GnssConfig {
     /// A receiver without corrections: 2.5 m circular error probable, as in its data sheet, are 2.1
     /// m along each axis.
     fn default() -> Self {
         Self {
-            kind: GnssKind::None,
+            kind: SensorKind::None,
             file: None,
             topic: None,
             listen: "127.0.0.1:6323".to_owned(),
@@ -76,14 +61,6 @@ impl Default for GnssConfig {
 }
 
 impl GnssConfig {
-    pub fn is_used(&self) -> bool {
-        self.kind != GnssKind::None
-    }
-
-    pub fn is_live(&self) -> bool {
-        matches!(self.kind, GnssKind::Udp | GnssKind::Ros2)
-    }
-
     pub fn validate(&self) -> Result<(), SettingError> {
         for metres in self.lever_m {
             check(
@@ -102,6 +79,15 @@ impl GnssConfig {
     }
 }
 
+sensor_config! { GnssConfig is Gnss:
+    /// Takes a fix over to the radar's clock, with the configured uncertainty where the log has
+    /// none.
+    fn on_radar(&self, sample: &Sample, _: Option<UpAxis>) -> Sample {
+        let sigma_m = sample.sigma_m().unwrap_or(self.sigma_m);
+        Sample::fix(on_clock(sample, self.delay_s), sample.place(), sample.values[2], sigma_m)
+    }
+}
+
 /// A fix of a GNSS receiver in a plane that touches the earth: where its antenna was.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssFix {
@@ -112,43 +98,13 @@ pub struct GnssFix {
     pub sigma_m: f64,
 }
 
-/// A fix as it was logged, even if it is invalid.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RawFix {
-    /// Time on the receiver's clock, ns since 1970.
-    pub stamp_ns: i64,
-    /// Latitude and longitude, degrees; or m east and north.
-    pub at: [f64; 2],
-    /// Altitude above the ellipsoid, m; 0 where the log has none.
-    pub altitude_m: f64,
-    /// Standard deviation along each of both axes, m; not above zero where the log has none.
-    pub sigma_m: f64,
-    /// The receiver does not state whether it had a fix.
-    pub status_is_unknown: bool,
-}
-
-impl RawFix {
-    pub fn geographic(&self) -> Geographic {
-        Geographic {
-            latitude_deg: self.at[0],
-            longitude_deg: self.at[1],
+impl From<Sample> for GnssFix {
+    fn from(fix: Sample) -> Self {
+        Self {
+            stamp_ns: fix.stamp_ns,
+            east_m: fix.values[0],
+            north_m: fix.values[1],
+            sigma_m: fix.values[3],
         }
     }
-
-    /// Returns the standard deviation along each of both axes with these variances along them, m²;
-    /// 0 if one is unknown, which is negative or not a number.
-    pub fn sigma_of(variances_m2: [f64; 2]) -> f64 {
-        match variances_m2.iter().all(|variance| *variance >= 0.0) {
-            true => (0.5 * (variances_m2[0] + variances_m2[1])).sqrt(),
-            false => 0.0,
-        }
-    }
-}
-
-/// The fixes in a bag of ROS 2, in degrees.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BagFixes {
-    pub topic: String,
-    pub fixes: Vec<RawFix>,
-    pub without_fix: usize,
 }

@@ -1,6 +1,6 @@
 //! Samples of a live gyro or of live wheels, until the scan comes that they go with.
 
-use crate::samples::{GyroConfig, MAX_SAMPLES, Sample, WheelsConfig, interval_of};
+use crate::samples::{GyroConfig, MAX_SAMPLES, Sample, SensorConfig, WheelsConfig, interval_of};
 
 /// A sample that is so much later than the last scan, or before the first scan so far from the
 /// newest sample, is of a clock that has jumped, ns.
@@ -18,8 +18,8 @@ pub enum LiveSensor {
 impl LiveSensor {
     fn on_radar(&self, sample: &Sample) -> Sample {
         match self {
-            Self::Gyro(config) => config.on_radar(sample),
-            Self::Wheels(config) => config.on_radar(sample),
+            Self::Gyro(config) => config.on_radar(sample, None),
+            Self::Wheels(config) => config.on_radar(sample, None),
         }
     }
 }

@@ -1,10 +1,13 @@
 use bytemuck::{Pod, Zeroable};
 
-/// One measurement of a sensor beside the radar, as it travels with a scan.
+use crate::samples::Geographic;
+
+/// One measurement of a sensor beside the radar, as it is logged, and as it travels with a scan.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Sample {
-    /// When it was measured, ns since 1970 on the radar's clock.
+    /// When it was measured, ns since 1970: with a scan on the radar's clock, in a log on the
+    /// sensor's own.
     pub stamp_ns: i64,
     /// The quantity: a number of [`SampleKind`].
     pub kind: u32,
@@ -31,6 +34,11 @@ pub enum SampleKind {
     Gyro = 1,
     /// Speed along x (m/s), negative backwards.
     Wheels = 2,
+    /// Place of the antenna: latitude and longitude (degrees), or east and north (m); altitude
+    /// above the ellipsoid (m), 0 where the log has none; standard deviation along each of both
+    /// axes (m), not above zero where the log has none; 1 if the receiver does not state whether it
+    /// had a fix. Fixes travel with no scan.
+    Gnss = 3,
 }
 
 impl SampleKind {
@@ -38,32 +46,66 @@ impl SampleKind {
         match self {
             Self::Gyro => "gyro",
             Self::Wheels => "wheels",
+            Self::Gnss => "gnss",
         }
     }
 }
 
 impl Sample {
-    /// Creates a sample of a gyro that measures the yaw rate alone, counter-clockwise, rad/s.
-    pub fn yaw_rate(stamp_ns: i64, rate_radps: f64) -> Self {
+    pub const fn of(kind: SampleKind, stamp_ns: i64, values: [f64; 6]) -> Self {
         Self {
             stamp_ns,
-            kind: SampleKind::Gyro as u32,
+            kind: kind as u32,
             reserved: 0,
-            values: [0.0, 0.0, rate_radps, 0.0, 0.0, 0.0],
+            values,
         }
+    }
+
+    /// Creates a sample of a gyro that measures the yaw rate alone, counter-clockwise, rad/s.
+    pub fn yaw_rate(stamp_ns: i64, rate_radps: f64) -> Self {
+        let values = [0.0, 0.0, rate_radps, 0.0, 0.0, 0.0];
+        Self::of(SampleKind::Gyro, stamp_ns, values)
     }
 
     pub fn speed(stamp_ns: i64, speed_mps: f64) -> Self {
-        Self {
-            stamp_ns,
-            kind: SampleKind::Wheels as u32,
-            reserved: 0,
-            values: [speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0],
+        let values = [speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0];
+        Self::of(SampleKind::Wheels, stamp_ns, values)
+    }
+
+    /// Creates a fix at a place with its altitude and standard deviation, m.
+    pub fn fix(stamp_ns: i64, [a, b]: [f64; 2], altitude_m: f64, sigma_m: f64) -> Self {
+        let values = [a, b, altitude_m, sigma_m, 0.0, 0.0];
+        Self::of(SampleKind::Gnss, stamp_ns, values)
+    }
+
+    /// The place of a fix: latitude and longitude, degrees, or m east and north.
+    pub fn place(&self) -> [f64; 2] {
+        [self.values[0], self.values[1]]
+    }
+
+    /// The standard deviation of a fix that is stated, m.
+    pub fn sigma_m(&self) -> Option<f64> {
+        Some(self.values[3]).filter(|sigma_m| *sigma_m > 0.0)
+    }
+
+    pub fn geographic(&self) -> Geographic {
+        Geographic {
+            latitude_deg: self.values[0],
+            longitude_deg: self.values[1],
         }
     }
 
-    /// Returns whether its kind is known, all its values are finite, and its rates are within
-    /// [`MAX_RATE_RADPS`], its speed within [`MAX_SPEED_MPS`].
+    /// Returns the standard deviation along each of both axes with these variances along them, m²;
+    /// 0 if one is unknown, which is negative or not a number.
+    pub fn sigma_of(variances_m2: [f64; 2]) -> f64 {
+        match variances_m2.iter().all(|variance| *variance >= 0.0) {
+            true => (0.5 * (variances_m2[0] + variances_m2[1])).sqrt(),
+            false => 0.0,
+        }
+    }
+
+    /// Returns whether it can travel with a scan: its kind does, all its values are finite, and its
+    /// rates are within [`MAX_RATE_RADPS`], its speed within [`MAX_SPEED_MPS`].
     pub fn is_valid(&self) -> bool {
         let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
         let are_finite = self.values.iter().all(|value| value.is_finite());
@@ -80,5 +122,24 @@ impl Sample {
 
     pub fn is(&self, kind: SampleKind) -> bool {
         self.kind == kind as u32
+    }
+}
+
+/// The samples of a sensor that a recording has, in the order of the recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Logged {
+    /// The topic in a bag of ROS 2.
+    pub topic: Option<String>,
+    pub samples: Vec<Sample>,
+    /// Messages that state that nothing was measured.
+    pub unmeasured: usize,
+}
+
+impl From<Vec<Sample>> for Logged {
+    fn from(samples: Vec<Sample>) -> Self {
+        Self {
+            samples,
+            ..Self::default()
+        }
     }
 }

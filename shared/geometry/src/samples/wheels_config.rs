@@ -6,7 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT, check},
     check_bounds,
-    samples::{Sample, WheelsKind},
+    samples::{
+        Sample, SensorKind, UpAxis,
+        config::{on_clock, sensor_config},
+    },
 };
 
 /// Configuration of the wheels' speed: section `[wheels]`.
@@ -16,7 +19,7 @@ use crate::{
 #[serde(default, deny_unknown_fields)]
 pub struct WheelsConfig {
     /// Whose speed is used.
-    pub kind: WheelsKind,
+    pub kind: SensorKind,
     /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -51,7 +54,7 @@ pub struct WheelsConfig {
 impl Default for WheelsConfig {
     fn default() -> Self {
         Self {
-            kind: WheelsKind::None,
+            kind: SensorKind::None,
             file: None,
             topic: None,
             listen: "127.0.0.1:6322".to_owned(),
@@ -69,22 +72,6 @@ impl Default for WheelsConfig {
 }
 
 impl WheelsConfig {
-    pub fn is_used(&self) -> bool {
-        self.kind != WheelsKind::None
-    }
-
-    pub fn is_live(&self) -> bool {
-        matches!(self.kind, WheelsKind::Udp | WheelsKind::Ros2)
-    }
-
-    /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is
-    /// applied.
-    pub fn on_radar(&self, sample: &Sample) -> Sample {
-        let late_ns = (self.delay_s * 1e9).round() as i64;
-        let speed_mps = sample.values[0] * self.scale;
-        Sample::speed(sample.stamp_ns.saturating_sub(late_ns), speed_mps)
-    }
-
     pub fn validate(&self) -> Result<(), SettingError> {
         check_bounds! { self, "wheels":
             delay_s in DELAY,
@@ -99,5 +86,17 @@ impl WheelsConfig {
         let step_m = self.m_per_tick.unwrap_or(1.0);
         let bounds = ([1e-6, 10.0], "metres, 0.000001 to 10");
         check("wheels", "m_per_tick", step_m, bounds)
+    }
+}
+
+sensor_config! { WheelsConfig is Wheels:
+    fn m_per_tick(&self) -> Option<f64> {
+        self.m_per_tick
+    }
+
+    /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is
+    /// applied.
+    fn on_radar(&self, sample: &Sample, _: Option<UpAxis>) -> Sample {
+        Sample::speed(on_clock(sample, self.delay_s), sample.values[0] * self.scale)
     }
 }

@@ -34,8 +34,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dataset = gyre_datasets::open(Path::new(folder), &config.dataset)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config.odometry)?;
-    let (gyro, wheels) = (&config.odometry.gyro, &config.odometry.wheels);
-    let samples = ScanSamples::open(gyro, wheels, Path::new(folder), dataset.as_mut())?;
+    let sensors = config.odometry.sensors();
+    let samples = ScanSamples::open(&sensors, Path::new(folder), dataset.as_mut())?;
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for index in 0..dataset.len() {
         match dataset.read(index, scan.slot()) {

@@ -8,7 +8,7 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_contract::flag;
-use gyre_datasets::GnssLog;
+use gyre_datasets::SampleLog;
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_journal as journal;
 use gyre_radar::Trajectory;
@@ -35,7 +35,7 @@ pub struct Slam {
     correction: Correction,
     queries: Vec<Query>,
     keyframes: Vec<(u64, i64)>,
-    gnss: Option<GnssLog>,
+    gnss: Option<SampleLog>,
 }
 
 /// Checks that a run without keyframes has no poses either: the first one has a keyframe.

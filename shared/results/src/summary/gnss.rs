@@ -1,6 +1,6 @@
 //! The part of the summary about GNSS.
 
-use gyre_datasets::GnssLog;
+use gyre_datasets::SampleLog;
 use gyre_geometry::{UncertainMotion, xy_yaw};
 use gyre_slam::{FixRefusal, TrajectoryEstimator, estimation::EstimationError, mapping::Origin};
 use serde::Serialize;
@@ -35,7 +35,10 @@ fn east_north(pose: &UncertainMotion) -> Value {
 }
 
 impl GnssSummary {
-    pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
+    pub fn of(
+        log: &SampleLog,
+        estimator: &mut TrajectoryEstimator,
+    ) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);
         let squares = Vec::from_iter(used.map(|it| it.chi_square * it.position.variance_m2));
@@ -57,8 +60,8 @@ impl GnssSummary {
         let mut figures = json!({
             "log": log.path.display().to_string(),
             "topic": log.topic,
-            "fixes": log.fixes.len(),
-            "faults": log.faults,
+            "fixes": log.samples.len(),
+            "faults": log.fault_figures(),
             // Before the first keyframe or after the last.
             "outside": counts.outside,
             // Farther from their keyframe than a different fix.
@@ -96,9 +99,11 @@ impl GnssSummary {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use gyre_geometry::{
         Twist, pose,
-        samples::{GnssConfig, GnssFix},
+        samples::{GnssConfig, GnssFix, SampleKind},
     };
     use gyre_slam::{EstimatorKind, Fixes, Keyframe};
     use nalgebra::Matrix3;
@@ -138,7 +143,11 @@ mod tests {
             estimator.push(&keyframe(k)).unwrap();
         }
         estimator.solve().unwrap();
-        let summary = GnssSummary::of(&GnssLog::default(), &mut estimator).unwrap();
+        let summary = GnssSummary::of(
+            &SampleLog::new(SampleKind::Gnss, Path::new("")),
+            &mut estimator,
+        )
+        .unwrap();
         let reason = FixRefusal::Elsewhere.to_string();
         assert_eq!(summary.refusal(), Some((reason.as_str(), true)));
         let figures = serde_json::to_value(&summary).unwrap();

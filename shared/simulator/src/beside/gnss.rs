@@ -61,7 +61,7 @@ pub(super) fn device<'a>(config: &SimulationConfig, path: &'a dyn Path) -> Optio
                 [place.latitude_deg, place.longitude_deg],
                 NOISE_M.hypot(BIAS_M),
             );
-            (!is_hole).then_some([at[0], at[1], sigma_m, 0.0, 0.0, 0.0])
+            (!is_hole).then_some([at[0], at[1], 0.0, sigma_m, 0.0, 0.0])
         }),
     })
 }

@@ -177,6 +177,7 @@ impl Driver {
                 Ok(taken) => taken.map(|(odometry, _)| odometry.sample(clock::since_1970_ns())),
                 Err(_) => Some(Sample::speed(0, f64::NAN)),
             },
+            SampleKind::Gnss => None,
         }
     }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{InspectedLogs, Report, timing::Timing};
-use crate::{Dataset, GnssLog, LogError, SampleLog};
+use crate::{Dataset, LogError, SampleLog, sample_log::kinds::Kind};
 
 /// The duration of the quietest time of the gyro, s.
 const QUIET_S: f64 = 5.0;
@@ -21,165 +21,166 @@ pub(super) fn examine(
     logs: &InspectedLogs,
     timing: Option<&Timing>,
 ) {
-    for section in ["gyro", "wheels", "gnss"] {
-        report.figure(section, Value::Null);
+    let kinds = [SampleKind::Gyro, SampleKind::Wheels, SampleKind::Gnss];
+    for of in kinds {
+        report.figure(of.section(), Value::Null);
     }
-    gyro(report, timing);
-    wheels(report, logs.m_per_tick, timing);
-    gnss(report, dataset, logs.gnss_topic.as_deref(), timing);
+    for of in kinds {
+        let kind = Kind::of(of);
+        let Some((file, log)) = log(report, dataset, kind, logs) else {
+            continue;
+        };
+        match log {
+            Ok(log) => content(report, kind, &file, &log, timing),
+            Err(error) => {
+                let (section, name) = (of.section(), report.name_of(&file));
+                report.line(section, format!("{name}: cannot be used"));
+                let (one, name) = (kind.one, file.file_name().unwrap_or_default().display());
+                report.find(format!(
+                    "The log of {one}, {name}, cannot be used: {error}."
+                ));
+                report.figure(section, json!({"file": file, "error": error}));
+            }
+        }
+    }
 }
 
-fn gyro(report: &mut Report, timing: Option<&Timing>) {
-    let words = ["gyro", "a gyro"];
-    let file = match SampleLog::find_gyro(&report.root) {
-        Ok(file) => file,
-        Err(LogError::InTruth { path }) => {
-            let why =
-                "the ground truth was computed of it: name it in gyro.file to use it all the same";
-            return unusable(report, words, &path, why);
-        }
-        Err(_) => return,
+/// Reads the log in the recording or beside it, or returns why it cannot be used; `None` without
+/// one.
+fn log(
+    report: &Report,
+    dataset: &mut dyn Dataset,
+    kind: &Kind,
+    logs: &InspectedLogs,
+) -> Option<(PathBuf, Result<SampleLog, String>)> {
+    let (of, root) = (kind.of, report.root.clone());
+    let in_recording = match of {
+        SampleKind::Gnss => dataset.logged(of, logs.gnss_topic.as_deref()),
+        _ => Ok(None),
     };
-    let log = match SampleLog::read_gyro(&file) {
-        Ok(log) => log,
-        Err(error) => return unusable(report, words, &file, &error.to_string()),
+    let (file, log) = match in_recording {
+        Ok(Some(logged)) => (root.clone(), SampleLog::of(of, logged, &root)),
+        Err(error) => (root, Err(error.into())),
+        Ok(None) => match SampleLog::find(of, &root) {
+            Ok(file) => (file.clone(), SampleLog::read(of, &file, logs.m_per_tick)),
+            Err(LogError::InTruth { path }) => {
+                let why = "the ground truth was computed of it: name it in gyro.file to use it all the same";
+                return Some((path, Err(why.to_owned())));
+            }
+            Err(_) => return None,
+        },
     };
+    Some((file, log.map_err(|error| error.to_string())))
+}
+
+fn content(
+    report: &mut Report,
+    kind: &Kind,
+    file: &Path,
+    log: &SampleLog,
+    timing: Option<&Timing>,
+) {
+    let (of, section) = (kind.of, kind.of.section());
     let times = Times::of(log.samples.iter().map(|it| it.stamp_ns), timing);
-    let quiet = quiet(&log.samples, times.period_s);
-    let what = format!("{}: ", report.name_of(&file));
-    times.lines(report, "gyro", &what, "samples");
-    if let Some(quiet) = &quiet {
-        let text = |[x, y, z]: [f64; 3]| format!("{x:.3}, {y:.3}, {z:.3}");
+    let Content {
+        what,
+        quiet,
+        finding,
+        mut figures,
+    } = match of {
+        SampleKind::Gyro => turns(log, times.period_s),
+        SampleKind::Wheels => path(log),
+        SampleKind::Gnss => places(log),
+    };
+    let name = log.topic.clone().unwrap_or_else(|| report.name_of(file));
+    times.lines(report, section, &format!("{name}: {what}"), kind.samples);
+    if let Some(quiet) = quiet {
+        report.line(format!("{section} quietest"), quiet);
+    }
+    for sentence in log.sentences().into_iter().chain(finding) {
+        report.find(format!("{}: {sentence}", kind.title));
+    }
+    let lies = match &log.topic {
+        Some(topic) => format!("{topic}{}, is in the bag", times.of_clocks()),
+        None => format!("{} beside the scans", times.lies(file)),
+    };
+    let (one, uses) = (kind.one, kind.uses);
+    let place = match of == SampleKind::Gnss && log.plane.is_none() {
+        true => " Its plane is its own: the map has no place on the earth by it.",
+        false => "",
+    };
+    report.find(format!("The log of {one}, {lies}: {uses} uses it.{place}"));
+    figures["faults"] = log.fault_figures();
+    if let Some(topic) = &log.topic {
+        figures["topic"] = json!(topic);
+    }
+    report.figure(section, times.figures(file, figures));
+}
+
+struct Content {
+    what: String,
+    quiet: Option<String>,
+    /// The sentence after the sentences about faults.
+    finding: Option<String>,
+    figures: Value,
+}
+
+fn turns(log: &SampleLog, period_s: f64) -> Content {
+    let up = log.up_by_gravity();
+    let axis = up.map(|up| format!("by gravity its axis {} points up.", up.name()));
+    let quiet = quiet(&log.samples, period_s);
+    let text = |[x, y, z]: [f64; 3]| format!("{x:.3}, {y:.3}, {z:.3}");
+    let in_words = quiet.as_ref().map(|quiet| {
         let (mean, sigma) = (text(quiet.mean_degps), text(quiet.sigma_degps));
         let after_s = quiet.after_s;
-        let quiet = format!(
+        format!(
             "{mean} deg/s about x, y, z, deviation {sigma}, in the 5 s from {after_s:.1} s on: bias and noise, if it stood"
-        );
-        report.line("gyro quietest", quiet);
+        )
+    });
+    Content {
+        what: String::new(),
+        quiet: in_words,
+        finding: axis,
+        figures: json!({"quiet": quiet, "up_by_gravity": up}),
     }
-    for sentence in log.faults.sentences(SampleKind::Gyro) {
-        report.find(format!("Gyro: {sentence}"));
-    }
-    let up = log.up_by_gravity();
-    if let Some(up) = up {
-        let axis = up.name();
-        report.find(format!("Gyro: by gravity its axis {axis} points up."));
-    }
-    let lies = times.lies(&file);
-    report.find(format!(
-        "The log of a gyro, {lies} beside the scans: `gyre calibrate` finds its axis and how late its clock is, and gyro.kind = \"auto\" uses it."
-    ));
-    let more = json!({"quiet": quiet, "up_by_gravity": up, "faults": log.faults});
-    report.figure("gyro", times.figures(&file, more));
 }
 
-fn wheels(report: &mut Report, m_per_tick: Option<f64>, timing: Option<&Timing>) {
-    let Ok(file) = SampleLog::find_wheels(&report.root) else {
-        return;
-    };
-    let name = report.name_of(&file);
-    let log = match SampleLog::read_wheels(&file, m_per_tick) {
-        Ok(log) => log,
-        Err(error) => {
-            return unusable(report, ["wheels", "the wheels"], &file, &error.to_string());
-        }
-    };
-    let times = Times::of(log.samples.iter().map(|it| it.stamp_ns), timing);
+fn path(log: &SampleLog) -> Content {
     let speeds = log.samples.iter().map(|sample| sample.values[0].abs());
     let fastest_mps = speeds.fold(0.0, f64::max);
     let steps = log.samples.windows(2).map(|pair| {
         0.5 * (pair[0].values[0] + pair[1].values[0]) * apart_s(pair[1].stamp_ns, pair[0].stamp_ns)
     });
     let path_m: f64 = steps.map(f64::abs).sum();
-    let what = format!("{name}: {path_m:.0} m at up to {fastest_mps:.1} m/s, ");
-    times.lines(report, "wheels", &what, "samples");
-    for sentence in log.faults.sentences(SampleKind::Wheels) {
-        report.find(format!("Wheels: {sentence}"));
+    Content {
+        what: format!("{path_m:.0} m at up to {fastest_mps:.1} m/s, "),
+        quiet: None,
+        finding: None,
+        figures: json!({"fastest_mps": fastest_mps, "path_m": path_m}),
     }
-    let lies = times.lies(&file);
-    report.find(format!(
-        "The log of the wheels, {lies} beside the scans: `gyre calibrate` finds how late its clock is, and wheels.kind = \"auto\" uses it."
-    ));
-    let more = json!({"fastest_mps": fastest_mps, "path_m": path_m, "faults": log.faults});
-    report.figure("wheels", times.figures(&file, more));
 }
 
-fn gnss(
-    report: &mut Report,
-    dataset: &mut dyn Dataset,
-    topic: Option<&str>,
-    timing: Option<&Timing>,
-) {
-    let Some((file, log)) = gnss_log(report, dataset, topic) else {
-        return;
-    };
-    let times = Times::of(log.fixes.iter().map(|fix| fix.stamp_ns), timing);
-    let first = log.fixes.first().map_or([0.0; 2], |fix| fix.east_north_m);
-    let from_first = log.fixes.iter().map(|fix| {
-        let [east, north] = [0, 1].map(|axis| fix.east_north_m[axis] - first[axis]);
+fn places(log: &SampleLog) -> Content {
+    let first = log.samples.first().map_or([0.0; 2], Sample::place);
+    let from_first = log.samples.iter().map(|fix| {
+        let [east, north] = [0, 1].map(|axis| fix.values[axis] - first[axis]);
         east.hypot(north)
     });
     let reach_m = from_first.fold(0.0, f64::max);
-    let sigma_m = median(log.fixes.iter().filter_map(|fix| fix.sigma_m));
+    let sigma_m = median(log.samples.iter().filter_map(Sample::sigma_m));
     let sigma = sigma_m.map_or("no accuracy stated".to_owned(), |m| {
         format!("standard deviation {m:.2} m as stated")
     });
-    let name = log.topic.clone().unwrap_or_else(|| report.name_of(&file));
-    let what = format!("{name}: up to {reach_m:.0} m from the first, {sigma}, ");
-    times.lines(report, "gnss", &what, "fixes");
-    if let Some(faults) = log.faults.listed() {
-        let sentence = format!("GNSS: entries of its log that are left out, or sorted: {faults}.");
-        report.find(sentence);
+    Content {
+        what: format!("up to {reach_m:.0} m from the first, {sigma}, "),
+        quiet: None,
+        finding: None,
+        figures: json!({
+            "on_the_earth": log.plane.is_some(),
+            "reach_m": reach_m,
+            "sigma_m": sigma_m,
+        }),
     }
-    let lies = match &log.topic {
-        Some(topic) => format!("{topic}{}, is in the bag", times.of_clocks()),
-        None => format!("{} beside the scans", times.lies(&file)),
-    };
-    let place = match log.plane.is_some() {
-        true => "",
-        false => " Its plane is its own: the map has no place on the earth by it.",
-    };
-    report.find(format!(
-        "The log of a GNSS receiver, {lies}: with slam.kind = \"graph\", gnss.kind = \"auto\" uses it.{place}"
-    ));
-    let mut more = json!({
-        "on_the_earth": log.plane.is_some(),
-        "reach_m": reach_m,
-        "sigma_m": sigma_m,
-        "faults": log.faults,
-    });
-    if let Some(topic) = &log.topic {
-        more["topic"] = json!(topic);
-    }
-    report.figure("gnss", times.figures(&file, more));
-}
-
-/// Returns the log in the recording or beside it; reports one that cannot be used.
-fn gnss_log(
-    report: &mut Report,
-    dataset: &mut dyn Dataset,
-    topic: Option<&str>,
-) -> Option<(PathBuf, GnssLog)> {
-    let root = report.root.clone();
-    let (file, log) = match dataset.fixes(topic) {
-        Ok(None) => {
-            let file = GnssLog::find(&root).ok()?;
-            (file.clone(), GnssLog::read(&file))
-        }
-        Ok(Some(fixes)) => (root.clone(), GnssLog::of(fixes, &root)),
-        Err(error) => (root, Err(error.into())),
-    };
-    let words = ["gnss", "a GNSS receiver"];
-    let log = log.map_err(|error| unusable(report, words, &file, &error.to_string()));
-    Some((file, log.ok()?))
-}
-
-fn unusable(report: &mut Report, [section, of]: [&str; 2], file: &Path, error: &str) {
-    let name = report.name_of(file);
-    report.line(section, format!("{name}: cannot be used"));
-    let name = file.file_name().unwrap_or_default().display();
-    report.find(format!("The log of {of}, {name}, cannot be used: {error}."));
-    report.figure(section, json!({"file": file, "error": error}));
 }
 
 struct Times {

@@ -15,7 +15,7 @@ use gyre_datasets::{
 };
 use gyre_geometry::{
     ScanSlot, SweepGeometry,
-    samples::{BagFixes, Sample, SampleKind},
+    samples::{Logged, SampleKind},
 };
 use gyre_ros2_messages::radar::DescribedRadar;
 use index::{Entry, Index};
@@ -196,16 +196,8 @@ impl Dataset for Scans {
         Some(self.index.entries.get(index)?.logged_ns)
     }
 
-    fn logged(
-        &mut self,
-        of: SampleKind,
-        topic: Option<&str>,
-    ) -> Result<Option<Vec<Sample>>, OpenError> {
+    fn logged(&mut self, of: SampleKind, topic: Option<&str>) -> Result<Option<Logged>, OpenError> {
         Ok(sensors::samples(&mut self.bag, &self.path, of, topic)?)
-    }
-
-    fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
-        Ok(sensors::fixes_of(&mut self.bag, &self.path, topic)?)
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {

@@ -1,5 +1,5 @@
 use crate::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
-use gyre_geometry::samples::{DopplerConfig, GyroConfig, WheelsConfig};
+use gyre_geometry::samples::{DopplerConfig, GyroConfig, SensorConfig, WheelsConfig};
 use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
 use schemars::JsonSchema;
@@ -35,8 +35,13 @@ pub struct OdometryConfig {
 }
 
 impl OdometryConfig {
+    /// The sensors whose samples come with the scans.
+    pub fn sensors(&self) -> [&dyn SensorConfig; 2] {
+        [&self.gyro, &self.wheels]
+    }
+
     pub fn has_samples(&self) -> bool {
-        self.gyro.is_used() || self.wheels.is_used()
+        self.sensors().iter().any(|sensor| sensor.kind().is_used())
     }
 }
 

@@ -105,12 +105,13 @@ impl Drive {
         );
         let wheels = write("wheels.csv", "stamp_ns,speed_m_s\n", wheels);
         let dataset = self.dataset.as_ref();
-        let turns = SampleLog::read_gyro(&gyro)
-            .and_then(|log| ScanSamples::of_gyro(&log, &self.config.gyro, dataset));
-        let speeds = SampleLog::read_wheels(&wheels, None)
-            .and_then(|log| ScanSamples::of_wheels(&log, &self.config.wheels, dataset));
-        let text = |error: gyre_datasets::LogError| error.to_string();
-        Ok(turns.map_err(text)?.and(speeds.map_err(text)?))
+        let files = [gyro, wheels];
+        let mut sensors = self.config.sensors().into_iter().zip(&files);
+        sensors.try_fold(ScanSamples::None, |all, (sensor, file)| {
+            let samples = SampleLog::read(sensor.of(), file, None)
+                .and_then(|log| ScanSamples::of_log(&log, sensor, dataset));
+            Ok(all.and(samples.map_err(|error| error.to_string())?))
+        })
     }
 
     fn refine(&self, samples: &ScanSamples) -> Ran {

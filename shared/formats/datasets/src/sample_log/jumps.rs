@@ -1,15 +1,10 @@
 //! Jumps: values that change faster than the values of a vehicle can.
 
 use gyre_geometry::samples::{Sample, SampleKind};
-
 use gyre_radar::median;
 
-/// The largest yaw acceleration of a vehicle, rad/s²: tyres that hold as much as they carry turn
-/// one with the wheelbase L, whose mass is spread over it, by 2 g / L. No vehicle with a radar is
-/// shorter than half a metre.
-const YAW_RADPS2: f64 = 40.0;
-/// The largest change of its speed, m/s²: twice as much as such tyres brake.
-const SPEED_MPS2: f64 = 20.0;
+use super::kinds::Kind;
+
 /// Time within which a value that has jumped jumps back, s: two turns of the radar. What stays for
 /// longer is seen by the radar.
 const BACK_S: f64 = 0.5;
@@ -45,10 +40,9 @@ impl Jumps {
 
 /// Leaves out samples of a kind, in the order of their stamps, that jump away from those before and
 /// back to those after them.
-pub(crate) fn leave_out(samples: &mut Vec<Sample>, kind: SampleKind) -> Jumps {
-    let (value, per_s) = match kind {
-        SampleKind::Gyro => (2, YAW_RADPS2),
-        SampleKind::Wheels => (0, SPEED_MPS2),
+pub(crate) fn leave_out(samples: &mut Vec<Sample>, of: SampleKind) -> Jumps {
+    let Some((value, per_s)) = Kind::of(of).changes else {
+        return Jumps::default();
     };
     let all: &[Sample] = samples;
     let at_least = at_least(all, per_s, value);

@@ -1,13 +1,12 @@
 //! Faults of logs: none of them changes a sample in silence.
 
 use gyre_datasets::LogFaults;
-use gyre_geometry::samples::SampleKind;
+use gyre_geometry::samples::SampleKind::Gyro;
 use proptest::prelude::*;
 
-use super::{START_NS, read};
+use super::{MS, START_NS, read};
 use crate::common::assert_refused;
 
-const MS: i64 = 1_000_000;
 const HEADER: &str = "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps";
 
 /// A log of 100 Hz; each sample has a rate of its own.
@@ -87,7 +86,7 @@ proptest! {
         let rows = rows(300);
         let mut lines: Vec<String> = text(&rows).lines().skip(1).map(str::to_owned).collect();
         let lost = fault.put(&mut lines);
-        let log = read("imu.csv", &format!("{HEADER}\n{}\n", lines.join("\n"))).unwrap();
+        let log = read(Gyro, "imu.csv", &format!("{HEADER}\n{}\n", lines.join("\n"))).unwrap();
         let expected: Vec<_> = (0..300).filter(|k| Some(*k) != lost).map(|k| rows[k]).collect();
         let found: Vec<_> = log.samples.iter().map(|it| (it.stamp_ns, it.values[2])).collect();
         prop_assert_eq!(found, expected);
@@ -103,14 +102,14 @@ proptest! {
         };
         prop_assert_eq!(counted, one);
         prop_assert_eq!(faults.bridged, usize::from(lost.is_some()));
-        prop_assert!(!faults.sentences(SampleKind::Gyro).is_empty());
+        prop_assert!(!log.sentences().is_empty());
     }
 
     /// Whatever a file holds, reading it ends with samples in the order of their stamps, which are
     /// finite and differ, or with a sentence.
     #[test]
     fn no_file_makes_disorder(rows in prop::collection::vec((prop::num::i64::ANY, prop::num::f64::ANY), 0..60)) {
-        let Ok(log) = read("imu.csv", &text(&rows)) else { return Ok(()) };
+        let Ok(log) = read(Gyro, "imu.csv", &text(&rows)) else { return Ok(()) };
         prop_assert!(log.samples.windows(2).all(|pair| pair[0].stamp_ns < pair[1].stamp_ns));
         prop_assert!(log.samples.iter().all(|it| it.values.iter().all(|value| value.abs() <= 10.0)));
         prop_assert_eq!(log.samples.len() + left_out(&log.faults), rows.len());
@@ -122,21 +121,21 @@ fn gaps_are_told_with_the_longest() {
     let mut rows = rows(300);
     rows.drain(200..280);
     rows.drain(100..103);
-    let log = read("imu.csv", &text(&rows)).unwrap();
+    let log = read(Gyro, "imu.csv", &text(&rows)).unwrap();
     let [gap, _] = &log.faults.gaps[..] else {
         panic!("{:?}", log.faults);
     };
     let is_first = (gap.after_s - 0.99).abs() < 1e-9 && (gap.seconds - 0.04).abs() < 1e-9;
     assert!(is_first, "{gap:?}");
     let sentence = "Samples are missing in 2 places, for up to 0.81 s (2.0 s after the first).";
-    assert_eq!(log.faults.sentences(SampleKind::Gyro), [sentence]);
+    assert_eq!(log.sentences(), [sentence]);
 }
 
 #[test]
 fn single_samples_that_are_missing_are_counted_and_stamps_that_jitter_are_not_taken_for_them() {
     let bridged = |stamp_ms: &dyn Fn(i64) -> Option<i64>| {
         let rows = (0..300).filter_map(|k| Some((START_NS + stamp_ms(k)? * MS, 0.0)));
-        let log = read("imu.csv", &text(&rows.collect::<Vec<_>>())).unwrap();
+        let log = read(Gyro, "imu.csv", &text(&rows.collect::<Vec<_>>())).unwrap();
         assert!(log.faults.gaps.is_empty(), "{:?}", log.faults);
         log.faults.bridged
     };
@@ -160,13 +159,13 @@ fn a_clock_that_was_set_leaves_the_longer_part() {
     ] {
         let mut rows = rows(300);
         rows[100..].iter_mut().for_each(|row| row.0 += step_ms * MS);
-        let log = read("imu.csv", &text(&rows)).unwrap();
+        let log = read(Gyro, "imu.csv", &text(&rows)).unwrap();
         let faults = &log.faults;
         let off_s = faults.clock_steps_s[0] - (1e-3 * step_ms as f64 + 0.01);
         assert!(off_s.abs() < 1e-6, "{faults:?}");
         assert_eq!(log.samples.len(), kept.len(), "{step_ms}");
         assert_eq!(log.samples[0].values[2], rows[kept.start].1);
-        let sentence = &faults.sentences(SampleKind::Gyro)[0];
+        let sentence = &log.sentences()[0];
         for words in ["The clock steps 1 times", "first behind sample 100"] {
             assert!(sentence.contains(words), "{sentence}");
         }
@@ -178,7 +177,7 @@ fn a_single_stamp_that_is_far_off_is_left_out() {
     for off_s in [-31_536_000i64, -30, 7_200, 31_536_000] {
         let mut rows = rows(300);
         rows[100].0 += off_s * 1_000_000_000;
-        let log = read("imu.csv", &text(&rows)).unwrap();
+        let log = read(Gyro, "imu.csv", &text(&rows)).unwrap();
         assert_eq!(log.samples.len(), 299, "{off_s}");
         assert_eq!(log.faults.by_clock_steps, 1, "{off_s}");
     }
@@ -189,7 +188,7 @@ fn times_that_are_measured_twice_are_used_by_nobody() {
     // From the 100th sample on the clock is 0.305 s back.
     let mut rows = rows(300);
     rows[100..].iter_mut().for_each(|row| row.0 -= 305 * MS);
-    let log = read("imu.csv", &text(&rows)).unwrap();
+    let log = read(Gyro, "imu.csv", &text(&rows)).unwrap();
     let mut stamps = log.samples.iter().map(|it| (it.stamp_ns - START_NS) / MS);
     assert!(stamps.all(|ms| !(695..=990).contains(&ms)), "{log:?}");
     assert_eq!(log.faults.out_of_order, 30);
@@ -202,13 +201,13 @@ fn a_log_in_degrees_is_refused_or_its_unit_said_to_be_assumed() {
     let mut turning = rows(300);
     turning.iter_mut().for_each(|row| row.1 *= 1e3);
     let remedy = "if they are in deg/s, name the columns so, as gyro_z_degps";
-    assert_refused(read("imu.csv", &text(&turning)), remedy);
+    assert_refused(read(Gyro, "imu.csv", &text(&turning)), remedy);
     let named = text(&turning).replace("_radps", "_degps");
-    let log = read("imu.csv", &named).unwrap();
+    let log = read(Gyro, "imu.csv", &named).unwrap();
     assert!((log.samples[299].values[2] - 29.9f64.to_radians()).abs() < 1e-12);
     let unnamed = text(&rows(300)).replace("_radps", "");
-    let log = read("imu.csv", &unnamed).unwrap();
-    let sentence = &log.faults.sentences(SampleKind::Gyro)[0];
+    let log = read(Gyro, "imu.csv", &unnamed).unwrap();
+    let sentence = &log.sentences()[0];
     assert!(sentence.contains("rad/s is assumed"), "{sentence}");
 }
 
@@ -221,7 +220,7 @@ fn stamps_that_are_no_clock_are_refused_with_the_steps() {
     ] {
         let rows = (0..300).map(|k| (START_NS + (k % 2) * step_ns, 0.0));
         let rows: Vec<_> = rows.collect();
-        let refused = read("imu.csv", &text(&rows)).unwrap_err().to_string();
+        let refused = read(Gyro, "imu.csv", &text(&rows)).unwrap_err().to_string();
         for words in [words, "first behind sample 2"] {
             assert!(refused.contains(words), "{refused}");
         }
@@ -242,16 +241,16 @@ fn samples_that_come_in_bursts_are_spread_back_to_the_burst_before() {
             measured.drain(lost.clone());
             rows.drain(lost);
         }
-        let log = read("imu.csv", &text(&rows)).unwrap();
+        let log = read(Gyro, "imu.csv", &text(&rows)).unwrap();
         let found: Vec<i64> = log.samples.iter().map(|it| it.stamp_ns).collect();
         assert_eq!(found, measured, "{size}");
         assert_eq!((log.faults.spread, left_out(&log.faults)), (rows.len(), 0));
-        let sentence = &log.faults.sentences(SampleKind::Gyro)[0];
+        let sentence = &log.sentences()[0];
         assert!(sentence.contains("in bursts of one stamp"), "{sentence}");
     }
     // Rows that were written twice are no bursts.
     let twice: Vec<_> = rows(300).iter().flat_map(|row| [*row, *row]).collect();
-    let log = read("imu.csv", &text(&twice)).unwrap();
+    let log = read(Gyro, "imu.csv", &text(&twice)).unwrap();
     assert_eq!((log.samples.len(), log.faults.repeated), (300, 300));
     assert_eq!(log.faults.spread, 0);
 }

@@ -1,74 +1,14 @@
-//! Logs of the wheels' speed.
+//! Logs of encoders and odometers, which count.
 
-use gyre_datasets::{LogError, SampleLog};
+use gyre_datasets::{LogError, LogFaults, SampleLog};
+use gyre_geometry::samples::{Sample, SampleKind};
 use tempfile::TempDir;
 
-use super::START_NS;
+use super::{MS, START_NS};
 use crate::common::{assert_refused, written};
-
-const MS: i64 = 1_000_000;
-
-fn read(text: &str) -> Result<SampleLog, LogError> {
-    let folder = TempDir::new().unwrap();
-    SampleLog::read_wheels(&written(&folder, "wheels.csv", text), None)
-}
-
-/// Rows of 20 Hz, each with a speed.
-fn rows(header: &str, speeds: &[&str]) -> String {
-    let row = |(k, speed): (i64, &&str)| format!("{},{speed}\n", START_NS + 50 * MS * k);
-    let rows: String = (0..).zip(speeds).map(row).collect();
-    format!("{header}\n{rows}")
-}
 
 fn speeds(log: &SampleLog) -> Vec<f64> {
     log.samples.iter().map(|sample| sample.values[0]).collect()
-}
-
-#[test]
-fn columns_are_found_by_their_names_and_units() {
-    for (header, expected, assumed) in [
-        ("stamp_ns,speed_m_s", 9.0, false),
-        ("timestamp,wheel_speed_mps", 9.0, false),
-        ("stamp_ns,speed_km_h", 2.5, false),
-        ("# stamp_ns, vehicle speed [km/h]", 2.5, false),
-        ("stamp_ns;velocity", 9.0, true),
-    ] {
-        let text = rows(header, &["9.0", "-9.0"]);
-        let text = match header.contains(';') {
-            true => text.replace(',', ";"),
-            false => text,
-        };
-        let log = read(&text).unwrap_or_else(|error| panic!("{header}: {error}"));
-        let found = speeds(&log);
-        assert!((found[0] - expected).abs() < 1e-12, "{header} {found:?}");
-        assert_eq!(found[1], -found[0], "{header}");
-        assert_eq!(log.faults.unit_is_assumed, assumed, "{header}");
-        assert_eq!(log.samples[1].stamp_ns, START_NS + 50 * MS);
-    }
-}
-
-#[test]
-fn what_is_no_log_of_wheels_is_refused_with_the_remedy() {
-    for (text, words) in [
-        (rows("stamp_ns,gyro_z_radps", &["0.1"]), "have no speed"),
-        (rows("number,speed_m_s", &["1"]), "have no stamps"),
-        (rows("1,2", &["1"]), "columns have no names"),
-        (
-            rows("stamp_ns,speed", &["120", "121"]),
-            "if they are in km/h",
-        ),
-        (rows("stamp_ns,speed_m_s", &[]), "it has no samples"),
-        (
-            rows("stamp_ns,speed_m_s,reverse", &["9.0,1"]),
-            "have a direction",
-        ),
-        (
-            rows("stamp_ns,ticks,direction", &["9,back"]),
-            "have a direction",
-        ),
-    ] {
-        assert_refused(read(&text), words);
-    }
 }
 
 /// Counts of 100 Hz, of a vehicle that drives now faster, now slower.
@@ -87,12 +27,13 @@ fn ticks(header: &str, m_per_tick: f64, row: impl Fn(usize, f64) -> String) -> S
 
 fn read_ticks(text: &str, m_per_tick: Option<f64>) -> Result<SampleLog, LogError> {
     let folder = TempDir::new().unwrap();
-    SampleLog::read_wheels(&written(&folder, "encoder.csv", text), m_per_tick)
+    let path = written(&folder, "encoder.csv", text);
+    SampleLog::read(SampleKind::Wheels, &path, m_per_tick)
 }
 
 /// The distance between the first and the last sample, m.
 fn path_m(log: &SampleLog) -> f64 {
-    let of_pair = |pair: &[gyre_geometry::samples::Sample]| {
+    let of_pair = |pair: &[Sample]| {
         let seconds = (pair[1].stamp_ns - pair[0].stamp_ns) as f64 * 1e-9;
         0.5 * (pair[0].values[0] + pair[1].values[0]) * seconds
     };
@@ -114,9 +55,8 @@ fn counts_become_speeds_whose_way_is_that_of_the_counts() {
         };
         let text = ticks(header, m_per_tick, row);
         let log = read_ticks(&text, (!is_in_metres).then_some(m_per_tick)).unwrap();
-        assert_eq!(log.faults, gyre_datasets::LogFaults::default(), "{header}");
-        let at =
-            |sample: &gyre_geometry::samples::Sample| (sample.stamp_ns - START_NS) as f64 * 1e-9;
+        assert_eq!(log.faults, LogFaults::default(), "{header}");
+        let at = |sample: &Sample| (sample.stamp_ns - START_NS) as f64 * 1e-9;
         let [first, last] = [log.samples.first(), log.samples.last()].map(|it| at(it.unwrap()));
         let driven = 8.0 * (last - first) + 3.0 * (last.sin() - first.sin());
         let off_m = path_m(&log) - driven;
@@ -178,17 +118,4 @@ fn ticks_need_their_length() {
     ] {
         assert_refused(read_ticks(text, m_per_tick), words);
     }
-}
-
-#[test]
-fn the_log_lies_beside_the_scans() {
-    let folder = TempDir::new().unwrap();
-    let expected = "no log of the wheels lies beside the scans";
-    assert_refused(SampleLog::find_wheels(folder.path()), expected);
-    let path = written(&folder, "wheels.csv", "");
-    assert_eq!(
-        SampleLog::find_wheels(&folder.path().join("radar")).unwrap(),
-        path
-    );
-    assert_eq!(SampleLog::find_wheels(folder.path()).unwrap(), path);
 }

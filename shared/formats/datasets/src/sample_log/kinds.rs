@@ -1,0 +1,399 @@
+//! The table of kinds: where the log of a sensor lies, what its columns are named, which values are
+//! plausible, and its words.
+
+use std::f64::consts::PI;
+
+use gyre_geometry::samples::{Sample, SampleKind};
+
+use super::{
+    columns::{Columns, Counts, Read},
+    faults::{FaultWords, OF_FIXES, OF_SAMPLES},
+};
+use crate::header::{Header, Sign, Stamp, endings, unit_of};
+
+#[derive(Clone, Copy)]
+pub(crate) struct Kind {
+    pub of: SampleKind,
+    /// The sensor in words: at the begin of a finding, with an article, and after one.
+    pub title: &'static str,
+    pub one: &'static str,
+    pub name: &'static str,
+    /// A measurement, in the plural.
+    pub samples: &'static str,
+    /// What is for the use of a log that was found, without its end.
+    pub uses: &'static str,
+    /// Logs relative to the root of a dataset, in order of precedence.
+    pub places: &'static [&'static str],
+    /// The log that a ground truth was computed from.
+    pub in_truth: Option<&'static str>,
+    /// The ending of the log that a recording has, in place of the recording's.
+    pub of_recording: Option<&'static str>,
+    /// The lines of RADIATE's `GPS_IMU_Twist` with the values, and the places in them.
+    pub twist: &'static [(usize, usize)],
+    pub by_names: fn(&Header) -> Result<Columns, String>,
+    pub by_number: fn(usize) -> Result<Columns, String>,
+    /// Makes a sample of the values that a log has.
+    pub sample: fn(i64, [f64; 6]) -> Sample,
+    /// The number of first values that every sample has. If all are blank, nothing was measured,
+    /// where `has_blanks`.
+    pub values: usize,
+    pub has_blanks: bool,
+    /// The largest of them, and what to do where many are larger.
+    pub most: f64,
+    pub beyond: &'static str,
+    pub faults: &'static [FaultWords],
+    /// Words of the faults: the values, those beyond `most`, and the unit that is assumed.
+    pub value_words: &'static str,
+    pub absurd: &'static str,
+    pub unit: &'static str,
+    /// The value that cannot change faster than a vehicle, and by how much it can in a second.
+    pub changes: Option<(usize, f64)>,
+}
+
+impl Kind {
+    pub fn of(of: SampleKind) -> &'static Self {
+        match of {
+            SampleKind::Gyro => &GYRO,
+            SampleKind::Wheels => &WHEELS,
+            SampleKind::Gnss => &GNSS,
+        }
+    }
+}
+
+const GYRO: Kind = Kind {
+    of: SampleKind::Gyro,
+    title: "Gyro",
+    one: "a gyro",
+    name: "gyro",
+    samples: "samples",
+    uses: "`gyre calibrate` finds its axis and how late its clock is, and gyro.kind = \"auto\"",
+    places: &[
+        "imu_as_logged.csv",
+        "imu.csv",
+        "gyro.csv",
+        // Boreas-RT
+        "imu/dmu_imu.csv",
+        "imu/dmu_imu_infilled.csv",
+        "imu/aeva_imu.csv",
+        // MulRan
+        "sensor_data/xsens_imu.csv",
+        "xsens_imu.csv",
+        // FoMo
+        "vectornav.csv",
+        "xsens.csv",
+        // RADIATE
+        "GPS_IMU_Twist",
+        "imu/imu.csv",
+    ],
+    // Of Boreas, the log of the INS.
+    in_truth: Some("applanix/imu.csv"),
+    of_recording: None,
+    twist: &[(5, 0), (5, 1), (5, 2), (6, 0), (6, 1), (6, 2)],
+    by_names: rates,
+    by_number: unnamed_rates,
+    sample: turning,
+    values: 3,
+    has_blanks: false,
+    most: 10.0,
+    beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
+    faults: OF_SAMPLES,
+    value_words: "rates",
+    absurd: "rates beyond 10 rad/s, at which no vehicle turns",
+    unit: "of the rates: rad/s is assumed; `gyre calibrate` tells deg/s by its scale",
+    // The largest yaw acceleration of a vehicle, rad/s²: tyres that hold as much as they carry turn
+    // one with the wheelbase L, whose mass is spread over it, by 2 g / L. No vehicle with a radar
+    // is shorter than half a metre.
+    changes: Some((2, 40.0)),
+};
+
+pub(super) const WHEELS: Kind = Kind {
+    of: SampleKind::Wheels,
+    title: "Wheels",
+    one: "the wheels",
+    name: "wheels",
+    uses: "`gyre calibrate` finds how late its clock is, and wheels.kind = \"auto\"",
+    places: &["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"],
+    in_truth: None,
+    twist: &[],
+    by_names: |header| speed(header).or_else(|reason| counts(header).ok_or(reason)),
+    by_number: |columns| {
+        Err(format!(
+            "its {columns} columns have no names: the first row must name them"
+        ))
+    },
+    sample: |stamp_ns, values| Sample::of(SampleKind::Wheels, stamp_ns, values),
+    values: 1,
+    most: MOST_MPS,
+    beyond: "have speeds beyond 100 m/s: if they are in km/h, name the column so, as speed_km_h",
+    value_words: "speeds",
+    absurd: "speeds beyond 100 m/s, at which no vehicle drives",
+    unit: "of the speed: m/s is assumed; `gyre calibrate` tells km/h by its scale",
+    // m/s²: twice as much as tyres brake that hold as much as they carry.
+    changes: Some((0, 20.0)),
+    ..GYRO
+};
+
+pub(super) const MOST_MPS: f64 = 100.0;
+
+const GNSS: Kind = Kind {
+    of: SampleKind::Gnss,
+    title: "GNSS",
+    one: "a GNSS receiver",
+    name: "GNSS receiver",
+    samples: "fixes",
+    uses: "with slam.kind = \"graph\", gnss.kind = \"auto\"",
+    places: &[
+        "gnss_as_logged.csv",
+        "gnss.csv",
+        // Oxford and OORD
+        "gps/gps.csv",
+        // MulRan
+        "sensor_data/gps.csv",
+        "gps.csv",
+        // RADIATE
+        "GPS_IMU_Twist",
+        "gnss_as_logged.tum",
+        "gnss.tum",
+    ],
+    in_truth: None,
+    of_recording: Some("gnss.csv"),
+    twist: &[(0, 0), (0, 1), (0, 2), (1, 0), (2, 1)],
+    by_names: positions,
+    by_number: unnamed_positions,
+    sample: fix,
+    values: 2,
+    has_blanks: true,
+    most: f64::MAX,
+    faults: OF_FIXES,
+    changes: None,
+    ..GYRO
+};
+
+fn missing(header: &Header, what: &str, hint: &str) -> String {
+    format!("its columns {} have no {what}: {hint}", header.listed())
+}
+
+fn unnamed(columns: usize, known: usize, of: &str, remedy: &str) -> Result<Columns, String> {
+    Err(format!(
+        "its {columns} columns have no names, and only the {known} of {of} are known without: {remedy}"
+    ))
+}
+
+/// Names of angular rates, `*` for the axis; the last is EuRoC's, as of accelerations.
+const RATES: &str = "gyro_* gyr_* w* w_* omega_* angular_velocity_* angular_rate_* angvel_* \
+    ang_vel_* rate_* angularvelocity* gyroscope_* gyro* g* g_* w_rs_s_*";
+const RATE_UNITS: [(&str, f64); 3] = [
+    ("_rad_s^-1 _radps _rad_s _rad_per_s _rps", 1.0),
+    ("_°_s _degps _deg_s _deg_per_s _dps", PI / 180.0),
+    ("_mdps", PI / 180e3),
+];
+
+const ACCELERATIONS: &str = "accel_* acc_* a* a_* linear_acceleration_* acceleration_* accel* \
+    lin_acc_* a_rs_s_*";
+const ACCELERATION_UNITS: [(&str, f64); 3] = [
+    ("_m_s^-2 _mps2 _m_s2 _m_per_s2", 1.0),
+    ("_g", 9.80665),
+    ("_mg", 9.80665e-3),
+];
+
+/// Headers of datasets, whose rates are in rad/s although the headers do not name the unit:
+/// Boreas-RT `dmu_imu.csv` and `aeva_imu.csv`, Boreas `applanix/imu.csv`.
+const KNOWN: [&[&str]; 2] = [
+    &["time", "wx", "wy", "wz", "ax", "ay", "az"],
+    &[
+        "gpstime", "angvel_z", "angvel_y", "angvel_x", "accelz", "accely", "accelx",
+    ],
+];
+/// FoMo `vectornav.csv` and `xsens.csv`: `a` are angular rates, `l` accelerations.
+const FOMO: [&str; 7] = ["t", "ax", "ay", "az", "lx", "ly", "lz"];
+
+const RATES_REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
+
+fn rates_and_accelerations(stamp: Stamp, rates: Vector, others: Option<Vector>) -> Columns {
+    let (rates, unit) = rates;
+    let columns = Columns::of(stamp).with(0, rates, Read::Number(unit.unwrap_or(1.0)));
+    match others {
+        Some((others, unit)) => columns.with(3, others, Read::NumberIfAny(unit.unwrap_or(1.0))),
+        None => columns,
+    }
+}
+
+fn rates(header: &Header) -> Result<Columns, String> {
+    let names = header.names();
+    if names == FOMO {
+        let accelerations = Some(([4, 5, 6], None));
+        let stamp = Stamp::first(true);
+        return Ok(rates_and_accelerations(
+            stamp,
+            ([1, 2, 3], None),
+            accelerations,
+        ));
+    }
+    let Some(rates) = vector(header, RATES, &RATE_UNITS) else {
+        let hint = match header.find("ins_status") {
+            Some(_) => "the INS logs of Oxford and OORD have positions and attitudes alone",
+            None => RATES_REMEDY,
+        };
+        return Err(missing(header, "angular rates about three axes", hint));
+    };
+    let stamp = header.stamp();
+    let stamp = stamp.ok_or_else(|| missing(header, "stamps", RATES_REMEDY))?;
+    let accelerations = vector(header, ACCELERATIONS, &ACCELERATION_UNITS);
+    let unit_is_assumed = rates.1.is_none() && !KNOWN.iter().any(|known| names == *known);
+    let mut columns = rates_and_accelerations(stamp, rates, accelerations);
+    columns.form.unit_is_assumed = unit_is_assumed;
+    Ok(columns)
+}
+
+/// MulRan `xsens_imu.csv` has no header: stamp (ns), quaternion, Euler angles, rates,
+/// accelerations, magnetic field. Its first version had no rates.
+fn unnamed_rates(columns: usize) -> Result<Columns, String> {
+    match columns {
+        17 => Ok(rates_and_accelerations(
+            Stamp::first(false),
+            ([8, 9, 10], None),
+            Some(([11, 12, 13], None)),
+        )),
+        8 => Err("as the first version of MulRan's xsens_imu.csv it has orientations and no angular rates, but 17 columns have them: download the recording anew".to_owned()),
+        _ => unnamed(columns, 17, "MulRan's xsens_imu.csv", RATES_REMEDY),
+    }
+}
+
+type Vector = ([usize; 3], Option<f64>);
+
+fn vector(header: &Header, patterns: &str, units: &[(&'static str, f64)]) -> Option<Vector> {
+    let units = endings(units).into_iter();
+    let units = units.map(|(name, factor)| (name, Some(factor)));
+    let units = units.chain([("", None)]);
+    let patterns = patterns.split(' ');
+    let mut forms = patterns.flat_map(|pattern| units.clone().map(move |unit| (pattern, unit)));
+    forms.find_map(|(pattern, (unit, factor))| {
+        let column = |axis: &str| header.find(&(pattern.replace('*', axis) + unit));
+        Some(([column("x")?, column("y")?, column("z")?], factor))
+    })
+}
+
+/// The accelerations are zero if one of them is not finite.
+fn turning(stamp_ns: i64, mut values: [f64; 6]) -> Sample {
+    if values[3..].iter().any(|value| !value.is_finite()) {
+        values[3..].fill(0.0);
+    }
+    Sample::of(SampleKind::Gyro, stamp_ns, values)
+}
+
+const SPEEDS: &str = "speed wheel_speed vehicle_speed velocity v vx linear_x";
+const SPEED_UNITS: [(&str, f64); 3] = [
+    ("_mps _m_s _m_per_s", 1.0),
+    ("_kmh _km_h _kmph _kph", 1.0 / 3.6),
+    ("_mph", 0.44704),
+];
+
+const SPEED_REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
+
+/// Columns with the direction of a speed that has no sign.
+const DIRECTIONS: &str =
+    "direction driving_direction travel_direction reverse is_reverse reversing";
+
+fn speed(header: &Header) -> Result<Columns, String> {
+    if header.find(DIRECTIONS).is_some() {
+        let columns = header.listed();
+        return Err(format!(
+            "its columns {columns} have a direction: write what goes backwards with a minus, and remove the direction"
+        ));
+    }
+    let missing = |what| missing(header, what, SPEED_REMEDY);
+    let speed = header.first(|name| unit_of(name, SPEEDS, &SPEED_UNITS));
+    let (speed, unit) = speed.ok_or_else(|| missing("speed"))?;
+    let stamp = header.stamp().ok_or_else(|| missing("stamps"))?;
+    let mut columns = Columns::of(stamp).with(0, [speed], Read::Number(unit.unwrap_or(1.0)));
+    columns.form.unit_is_assumed = unit.is_none();
+    Ok(columns)
+}
+
+/// Names of the ticks of one wheel, or of an axle.
+const TICKS: &str = "ticks pulses wheel_ticks encoder_ticks";
+/// Names of the ticks of two wheels of an axle; their mean is used.
+const LEFT: &str = "left_ticks ticks_left left_count";
+const RIGHT: &str = "right_ticks ticks_right right_count";
+const METRES: &str = "distance_m odometer_m mileage_m";
+
+/// The columns of an encoder or an odometer, which counts ticks or metres since some time.
+fn counts(header: &Header) -> Option<Columns> {
+    let one = |names: &str| header.find(names).map(|column| [column; 2]);
+    let both = || Some([header.find(LEFT)?, header.find(RIGHT)?]);
+    let metres = one(METRES);
+    let counts = metres.or_else(both).or_else(|| one(TICKS))?;
+    let has_direction = header.find(DIRECTIONS).is_some();
+    let mut columns = Columns::of(header.stamp()?).with(0, counts, Read::Number(1.0));
+    columns.form.counts = Some(metres.map_or(Counts::Ticks, |_| Counts::Metres));
+    (!has_direction).then_some(columns)
+}
+
+/// Names of columns: of latitude, longitude, east, north, altitude.
+const LATITUDE: &str = "latitude_deg latitude lat lat_deg";
+const LONGITUDE: &str = "longitude_deg longitude lon lng lon_deg";
+const EAST: &str = "east_m easting_m easting east";
+const NORTH: &str = "north_m northing_m northing north";
+const ALTITUDE: &str = "altitude_m altitude alt";
+/// The hemispheres of latitudes and longitudes without a sign.
+const NORTH_OR_SOUTH: Sign = Sign {
+    names: "n_s ns n_s_indicator ns_indicator lat_ref latitude_ref lat_dir latitude_dir lat_ns lat_hemisphere latitude_hemisphere hemisphere",
+    plus: "n north",
+    minus: "s south",
+};
+const EAST_OR_WEST: Sign = Sign {
+    names: "e_w ew e_w_indicator ew_indicator lon_ref longitude_ref lon_dir longitude_dir lon_ew lon_hemisphere longitude_hemisphere",
+    plus: "e east",
+    minus: "w west",
+};
+/// Standard deviation along each axis; of Oxford the one along north, beside that along east.
+const SIGMA: &str = "sigma_m sigma latitude_sigma";
+const SIGMA_EAST: &str = "longitude_sigma";
+/// ROS: the status of a fix, and the number where it is unknown.
+const STATUS: &str = "status_status";
+const STATUS_UNKNOWN: &str = "-2";
+
+const POSITIONS_REMEDY: &str = "the first row must name the columns, as in `stamp_ns,latitude_deg,longitude_deg,sigma_m` or `stamp_ns,east_m,north_m,sigma_m` (also stamp_us, stamp_s)";
+
+fn positions(header: &Header) -> Result<Columns, String> {
+    let on_earth = header.find(LATITUDE).zip(header.find(LONGITUDE));
+    let in_plane = header.find(EAST).zip(header.find(NORTH));
+    let missing = |what| missing(header, what, POSITIONS_REMEDY);
+    let (a, b) = on_earth.or(in_plane).ok_or_else(|| missing("positions"))?;
+    let stamp = header.stamp().ok_or_else(|| missing("stamps"))?;
+    let sign = |sign: &'static Sign| match header.find(sign.names).filter(|_| on_earth.is_some()) {
+        Some(column) => Read::Signed(column, sign),
+        None => Read::Number(1.0),
+    };
+    let east = header.find(SIGMA_EAST);
+    let sigma = header.find(SIGMA).or(east);
+    let sigma = sigma.map(|north| [north, east.unwrap_or(north)]);
+    let mut columns = Columns::of(stamp)
+        .with(0, [a], sign(&NORTH_OR_SOUTH))
+        .with(1, [b], sign(&EAST_OR_WEST))
+        .with(2, header.find(ALTITUDE), Read::NumberOrBlank)
+        // A negative deviation has a negative square.
+        .with(3, sigma.into_iter().flatten(), Read::Square)
+        .with(5, header.find(STATUS), Read::Is(STATUS_UNKNOWN));
+    columns.form.is_plane = on_earth.is_none();
+    Ok(columns)
+}
+
+/// MulRan `gps.csv` has no header: stamp (ns), latitude, longitude, altitude, covariance (3 x 3,
+/// m², east first).
+fn unnamed_positions(columns: usize) -> Result<Columns, String> {
+    match columns {
+        13 => Ok(Columns::of(Stamp::first(false))
+            .with(0, [1, 2], Read::Number(1.0))
+            .with(2, [3, 4, 8], Read::NumberOrBlank)),
+        _ => unnamed(columns, 13, "MulRan's gps.csv", POSITIONS_REMEDY),
+    }
+}
+
+/// A fix of a place, an altitude, variances along north and east, and 1 if its status is unknown.
+fn fix(stamp_ns: i64, [a, b, altitude_m, north_m2, east_m2, is_unknown]: [f64; 6]) -> Sample {
+    let sigma_m = Sample::sigma_of([north_m2, east_m2]);
+    let mut fix = Sample::fix(stamp_ns, [a, b], altitude_m, sigma_m);
+    fix.values[4] = is_unknown;
+    fix
+}
