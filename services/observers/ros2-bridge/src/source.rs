@@ -13,20 +13,13 @@ use std::time::Duration;
 use gyre_client::RunError;
 use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::samples::{
-    GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind,
-};
+use gyre_geometry::samples::{GnssConfig, GyroConfig, SensorConfig, SensorKind, WheelsConfig};
 use gyre_ros2_messages::Domain;
 use gyre_stage::{Launch, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
 
 pub use ask::ask;
 pub use gyre_stages::live_radar::Sizes;
-
-/// The topic of an inertial sensor by REP-145.
-const IMU: &str = "/imu/data";
-/// The topic of the odometry of wheels, as drivers of bases name it.
-const ODOMETRY: &str = "/odom";
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -35,8 +28,8 @@ pub struct Settings {
     pub topic: String,
     pub gyro_topic: Option<String>,
     pub wheels_topic: Option<String>,
-    /// The receiver of GNSS, if it is in ROS 2.
-    pub fixes: Option<GnssConfig>,
+    /// The topic of a receiver of GNSS, and the address to which its fixes are passed on.
+    pub fixes: Option<[String; 2]>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -73,14 +66,14 @@ impl Settings {
 }
 
 pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, RunError> {
-    let gyro: GyroConfig = launch.section("gyro")?;
-    let topic = gyro.topic.unwrap_or_else(|| IMU.to_owned());
-    settings.gyro_topic = (gyro.kind == GyroKind::Ros2).then_some(topic);
-    let wheels: WheelsConfig = launch.section("wheels")?;
-    let topic = wheels.topic.unwrap_or_else(|| ODOMETRY.to_owned());
-    settings.wheels_topic = (wheels.kind == WheelsKind::Ros2).then_some(topic);
+    let (gyro, wheels): (GyroConfig, WheelsConfig) =
+        (launch.section("gyro")?, launch.section("wheels")?);
     let gnss: GnssConfig = launch.section("gnss")?;
-    settings.fixes = (gnss.kind == GnssKind::Ros2).then_some(gnss);
+    let topic =
+        |it: &dyn SensorConfig| (it.kind() == SensorKind::Ros2).then(|| it.live_topic().to_owned());
+    settings.gyro_topic = topic(&gyro);
+    settings.wheels_topic = topic(&wheels);
+    settings.fixes = topic(&gnss).map(|topic| [topic, gnss.listen.clone()]);
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::open(settings)?, scans)
 }
