@@ -13,7 +13,9 @@ use std::time::Duration;
 use gyre_client::RunError;
 use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::samples::{GnssConfig, GyroConfig, SensorConfig, SensorKind, WheelsConfig};
+use gyre_geometry::samples::{
+    GnssConfig, GyroConfig, SampleKind, SensorConfig, SensorKind, WheelsConfig,
+};
 use gyre_ros2_messages::Domain;
 use gyre_stage::{Launch, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
@@ -26,10 +28,10 @@ pub struct Settings {
     pub domain: Domain,
     /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
     pub topic: String,
-    pub gyro_topic: Option<String>,
-    pub wheels_topic: Option<String>,
-    /// The topic of a receiver of GNSS, and the address to which its fixes are passed on.
-    pub fixes: Option<[String; 2]>,
+    /// The topics of the sensors beside the radar that are in ROS 2.
+    pub sensors: Vec<(SampleKind, String)>,
+    /// The address to which fixes are passed on.
+    pub fixes_to: String,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -47,9 +49,8 @@ impl Settings {
         Ok(Self {
             domain: Domain::new(source.domain, interface)?,
             topic: source.topic.clone(),
-            gyro_topic: None,
-            wheels_topic: None,
-            fixes: None,
+            sensors: Vec::new(),
+            fixes_to: String::new(),
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
@@ -69,11 +70,11 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Run
     let (gyro, wheels): (GyroConfig, WheelsConfig) =
         (launch.section("gyro")?, launch.section("wheels")?);
     let gnss: GnssConfig = launch.section("gnss")?;
-    let topic =
-        |it: &dyn SensorConfig| (it.kind() == SensorKind::Ros2).then(|| it.live_topic().to_owned());
-    settings.gyro_topic = topic(&gyro);
-    settings.wheels_topic = topic(&wheels);
-    settings.fixes = topic(&gnss).map(|topic| [topic, gnss.listen.clone()]);
+    let sensors: [&dyn SensorConfig; 3] = [&gyro, &wheels, &gnss];
+    let in_ros2 = sensors.iter().filter(|it| it.kind() == SensorKind::Ros2);
+    let topics = in_ros2.map(|it| (it.of(), it.live_topic().to_owned()));
+    settings.sensors = topics.collect();
+    settings.fixes_to.clone_from(&gnss.listen);
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::open(settings)?, scans)
 }

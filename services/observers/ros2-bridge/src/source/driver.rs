@@ -91,17 +91,25 @@ impl Driver {
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
         let mut sample_wakeups = Wakeups::new()?;
-        let mut samples = Vec::new();
-        if let Some(topic) = &settings.gyro_topic {
-            let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
-            samples.push(taken(SampleKind::Gyro, topic, Imu::sample));
+        let (mut samples, mut fixes) = (Vec::new(), None);
+        for (kind, topic) in &settings.sensors {
+            let of_kind = match kind {
+                SampleKind::Gyro => {
+                    let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
+                    taken(*kind, topic, Imu::sample)
+                }
+                SampleKind::Wheels => {
+                    let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
+                    taken(*kind, topic, Odometry::sample)
+                }
+                SampleKind::Gnss => {
+                    let to = &settings.fixes_to;
+                    fixes = Some(Fixes::open(&mut node, &mut wakeups, topic, to)?);
+                    continue;
+                }
+            };
+            samples.push(of_kind);
         }
-        if let Some(topic) = &settings.wheels_topic {
-            let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
-            samples.push(taken(SampleKind::Wheels, topic, Odometry::sample));
-        }
-        let fixes = settings.fixes.as_ref();
-        let fixes = fixes.map(|config| Fixes::open(&mut node, &mut wakeups, config));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
@@ -110,7 +118,7 @@ impl Driver {
             older: wakeups.subscribe(&mut node, &topic, TURNS, false)?,
             azimuths: None,
             samples,
-            fixes: fixes.transpose()?,
+            fixes,
             node,
             wakeups,
             sample_wakeups,

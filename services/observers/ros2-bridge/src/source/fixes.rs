@@ -28,7 +28,8 @@ impl Fixes {
     pub fn open(
         node: &mut Node,
         wakeups: &mut Wakeups,
-        [topic, listen]: &[String; 2],
+        topic: &str,
+        listen: &str,
     ) -> Result<Self, RunError> {
         let failed = |error: io::Error| {
             RunError::Input(format!(
