@@ -1,16 +1,9 @@
 //! A live radar with a live GNSS receiver, whose fixes arrive in datagrams.
 
-use std::{
-    net::UdpSocket,
-    path::PathBuf,
-    thread::{self, JoinHandle},
-    time::Duration,
-};
-
 use tempfile::TempDir;
 
 use super::{
-    gyro::address,
+    gyro::{address, lines_of, sending},
     radar::{Radar, complete},
 };
 use crate::{
@@ -50,33 +43,15 @@ pub fn log_of_drive() -> String {
     lines.map(|line| format!("{line}\n")).collect()
 }
 
-fn received(run: &Run) -> PathBuf {
-    run.out().join("journal/gnss.csv")
-}
-
-/// A receiver that sends the fixes of the drive once the run takes them: one late, one twice, one
-/// invalid, and one line without a fix.
-fn sending(run: &Run, address: String) -> JoinHandle<()> {
-    let received = received(run);
-    thread::spawn(move || {
-        let text = log_of_drive();
-        let mut lines: Vec<&str> = text.lines().skip(1).collect();
-        lines.swap(20, 21);
-        lines.insert(30, lines[29]);
-        lines.insert(40, "hello");
-        let stamp = lines[50].split(',').next().unwrap();
-        let without = format!("{stamp},,");
-        lines.insert(50, &without);
-        while !received.exists() {
-            thread::sleep(Duration::from_millis(5));
-        }
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        for datagram in lines.chunks(10) {
-            let text = datagram.join("\n");
-            socket.send_to(text.as_bytes(), &address).unwrap();
-            thread::sleep(Duration::from_millis(200));
-        }
-    })
+/// Returns what a receiver sends during the drive: one line late, one twice, one that is no fix, and
+/// one without a fix.
+fn lines() -> Vec<String> {
+    let mut lines = lines_of(&log_of_drive());
+    lines.swap(20, 21);
+    lines.insert(30, lines[29].clone());
+    let stamp = lines[50].split(',').next().unwrap();
+    lines.insert(50, format!("{stamp},,"));
+    lines
 }
 
 #[test]
@@ -85,7 +60,7 @@ fn fixes_of_a_live_receiver_correct_the_trajectory_and_the_recording_replays_to_
     let address = address(3);
     let radar = Radar::playing(drive.path(), &[]);
     let run = recorded(&receiving(&radar, &address, SCANS));
-    let receiver = sending(&run, address);
+    let receiver = sending(lines(), address, 200);
     let live = run.complete();
     receiver.join().unwrap();
     assert_eq!(run.summary()["dropped"], 0);

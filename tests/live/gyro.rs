@@ -3,7 +3,7 @@
 use std::{
     fs,
     net::UdpSocket,
-    path::{Path, PathBuf},
+    path::Path,
     process,
     thread::{self, JoinHandle},
     time::Duration,
@@ -28,25 +28,31 @@ pub fn with_log() -> TempDir {
     complete(recording::linked(&drive, |_| true))
 }
 
-/// A sensor that sends a log once somebody receives it, in datagrams of ten samples.
-fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
+/// A sensor that sends lines once somebody receives them, in datagrams of ten with this pause.
+pub fn sending(lines: Vec<String>, address: String, pause_ms: u64) -> JoinHandle<()> {
     thread::spawn(move || {
-        let text = fs::read_to_string(log).unwrap();
-        let lines: Vec<&str> = text.lines().skip(1).collect();
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(&address).unwrap();
-        // While nobody receives, each send reports the failure of the send before.
+        // While nobody receives, each send reports the failure of the send before. The run tries
+        // its addresses for a moment before it receives.
         let probe = || {
-            socket.send(b"")?;
-            thread::sleep(Duration::from_millis(5));
-            socket.send(b"")
+            (0..3).try_for_each(|_| {
+                thread::sleep(Duration::from_millis(5));
+                socket.send(b"").map(drop)
+            })
         };
         while probe().is_err() {}
         for datagram in lines.chunks(10) {
             socket.send(datagram.join("\n").as_bytes()).unwrap();
+            thread::sleep(Duration::from_millis(pause_ms));
         }
-        socket.send(b"no sample").unwrap();
     })
+}
+
+/// Returns the lines of a log without its header, and one that is no measurement.
+pub fn lines_of(log: &str) -> Vec<String> {
+    let lines = log.lines().skip(1).chain(["hello"]);
+    lines.map(str::to_owned).collect()
 }
 
 /// Returns an address that stays free: senders take their ports on 127.0.0.1.
@@ -75,7 +81,10 @@ fn a_live_gyro_and_wheels_give_the_motions_of_their_logs_and_the_recording_repla
         .set(&format!("wheels.listen='{of_wheels}'"))
         .set("run.window=32");
     let sensors = [("imu.csv", of_gyro), ("wheels.csv", of_wheels)];
-    let sensors = sensors.map(|(log, address)| sending(whole.path().join(log), address));
+    let sensors = sensors.map(|(log, address)| {
+        let log = fs::read_to_string(whole.path().join(log)).unwrap();
+        sending(lines_of(&log), address, 0)
+    });
     let live = run.complete();
     for sensor in sensors {
         sensor.join().unwrap();

@@ -1,7 +1,6 @@
 //! Checks before the first process is started.
 
 use std::{
-    net::UdpSocket,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -15,8 +14,9 @@ use gyre_contract::{
     run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind},
 };
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
-use gyre_geometry::samples::{GyroKind, MAX_SAMPLES};
+use gyre_geometry::samples::{MAX_SAMPLES, SensorKind};
 use gyre_masking::Masker;
+use gyre_stage::datagrams::check_addresses;
 use gyre_stages::{
     live_radar::{Settings, Sizes},
     radar_replay::{Listing, Player},
@@ -68,7 +68,11 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
     if configuration.objects.is_on() {
         gyre_stages::followers::objects::tracker(&configuration.odometry.masking)?;
     }
-    check_gnss(configuration)?;
+    if !configuration.gnss.is_live() {
+        // Where the results lie does not matter to a log.
+        gnss_log(configuration, Path::new(""))?;
+    }
+    check_addresses(&[&configuration.gnss])?;
     if configuration.slam.is_localised() {
         searched_map::open(&configuration.slam.map, configuration)?;
     }
@@ -198,18 +202,16 @@ impl Scans {
     fn of_radar(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Self, Failure> {
         let is_in_ros2 = configuration.source.kind == SourceKind::Ros2;
         let odometry = &configuration.odometry;
-        for (sensor, kind) in [
-            ("gyro", odometry.gyro.kind),
-            ("wheels", odometry.wheels.kind),
-        ] {
-            let comes = match kind {
-                GyroKind::None | GyroKind::Udp => true,
-                GyroKind::Ros2 => is_in_ros2,
-                GyroKind::Auto | GyroKind::Log => false,
+        for sensor in odometry.sensors() {
+            let comes = match sensor.kind() {
+                SensorKind::None | SensorKind::Udp => true,
+                SensorKind::Ros2 => is_in_ros2,
+                SensorKind::Auto | SensorKind::Log => false,
             };
             if !comes {
+                let section = sensor.of().section();
                 return Err(format!(
-                    "{sensor}.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
+                    "{section}.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
                 )
                 .into());
             }
@@ -217,6 +219,7 @@ impl Scans {
         if odometry.doppler.is_used() {
             return Err("doppler.kind is `auto`, but a live radar does not report which of its chirps rise: set it to `none`".into());
         }
+        check_addresses(&odometry.sensors())?;
         configuration.dataset.check()?;
         let radar = ask(configuration)?;
         Ok(Self {
@@ -246,19 +249,6 @@ pub(crate) fn needs_all(dataset: &dyn Dataset) -> bool {
     matches!(dataset.format(), Format::Mcap | Format::Ros2Bag)
 }
 
-fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
-    let config = &configuration.gnss;
-    if !config.is_live() {
-        // Where the results lie does not matter to a log.
-        return gnss_log(configuration, Path::new("")).map(drop);
-    }
-    let address = &config.listen;
-    let opened = UdpSocket::bind(address).map(drop);
-    opened.map_err(|error| {
-        format!("cannot receive the fixes of GNSS at {address} (gnss.listen): {error}").into()
-    })
-}
-
 /// The transport's own errors would not name the missing limit.
 pub fn check_open_files() -> Result<(), Failure> {
     match getrlimit(Resource::Nofile).current {
@@ -286,22 +276,24 @@ pub fn check_shared_memory(footprint: &Footprint) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
+    use std::net::UdpSocket;
+
     use super::*;
 
     #[test]
-    fn an_address_for_fixes_that_another_program_has_is_refused_before_the_run() {
+    fn an_address_that_another_program_has_is_refused_before_the_run() {
         let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
         let address = taken.local_addr().unwrap();
-        let settings = format!(
-            "source.kind=colossus source.address=127.0.0.1:9 run.mode=live run.rate=realtime \
-             slam.kind=graph gnss.kind=udp gnss.listen={address}"
-        );
-        let settings: Vec<String> = settings.split_whitespace().map(str::to_owned).collect();
-        let configuration = Configuration::of_overrides(&settings).unwrap();
-        let refused = check_gnss(&configuration).unwrap_err().to_string();
-        assert!(
-            refused.contains(&format!("{address} (gnss.listen)")),
-            "{refused}"
-        );
+        for section in ["gyro", "wheels", "gnss"] {
+            let settings = format!(
+                "source.kind=colossus source.address=127.0.0.1:9 run.mode=live run.rate=realtime \
+                 slam.kind=graph {section}.kind=udp {section}.listen={address}"
+            );
+            let settings: Vec<String> = settings.split_whitespace().map(str::to_owned).collect();
+            let configuration = Configuration::of_overrides(&settings).unwrap();
+            let refused = check_addresses(&configuration.sensors()).unwrap_err();
+            let expected = format!("{address} ({section}.listen)");
+            assert!(refused.to_string().contains(&expected), "{refused}");
+        }
     }
 }

@@ -27,7 +27,7 @@ pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{GnssConfig, GnssFix};
 pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
 pub use integral::interval_of;
-pub use live::{LiveSamples, LiveSensor};
+pub use live::LiveSamples;
 pub use sample::{Logged, MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
 pub use wheels::{WheelDistance, Wheels};
 pub use wheels_config::WheelsConfig;

@@ -14,7 +14,7 @@ use gyre_client::RunError;
 use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::samples::{
-    GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind,
+    GnssConfig, GyroConfig, SampleKind, SensorConfig, SensorKind, WheelsConfig,
 };
 use gyre_ros2_messages::Domain;
 use gyre_stage::{Launch, source};
@@ -23,20 +23,15 @@ use gyre_stages::live_radar::{encoder_counts, silence};
 pub use ask::ask;
 pub use gyre_stages::live_radar::Sizes;
 
-/// The topic of an inertial sensor by REP-145.
-const IMU: &str = "/imu/data";
-/// The topic of the odometry of wheels, as drivers of bases name it.
-const ODOMETRY: &str = "/odom";
-
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     pub domain: Domain,
     /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
     pub topic: String,
-    pub gyro_topic: Option<String>,
-    pub wheels_topic: Option<String>,
-    /// The receiver of GNSS, if it is in ROS 2.
-    pub fixes: Option<GnssConfig>,
+    /// The topics of the sensors beside the radar that are in ROS 2.
+    pub sensors: Vec<(SampleKind, String)>,
+    /// The address to which fixes are passed on.
+    pub fixes_to: String,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -54,9 +49,8 @@ impl Settings {
         Ok(Self {
             domain: Domain::new(source.domain, interface)?,
             topic: source.topic.clone(),
-            gyro_topic: None,
-            wheels_topic: None,
-            fixes: None,
+            sensors: Vec::new(),
+            fixes_to: String::new(),
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
@@ -73,14 +67,14 @@ impl Settings {
 }
 
 pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, RunError> {
-    let gyro: GyroConfig = launch.section("gyro")?;
-    let topic = gyro.topic.unwrap_or_else(|| IMU.to_owned());
-    settings.gyro_topic = (gyro.kind == GyroKind::Ros2).then_some(topic);
-    let wheels: WheelsConfig = launch.section("wheels")?;
-    let topic = wheels.topic.unwrap_or_else(|| ODOMETRY.to_owned());
-    settings.wheels_topic = (wheels.kind == WheelsKind::Ros2).then_some(topic);
+    let (gyro, wheels): (GyroConfig, WheelsConfig) =
+        (launch.section("gyro")?, launch.section("wheels")?);
     let gnss: GnssConfig = launch.section("gnss")?;
-    settings.fixes = (gnss.kind == GnssKind::Ros2).then_some(gnss);
+    let sensors: [&dyn SensorConfig; 3] = [&gyro, &wheels, &gnss];
+    let in_ros2 = sensors.iter().filter(|it| it.kind() == SensorKind::Ros2);
+    let topics = in_ros2.map(|it| (it.of(), it.live_topic().to_owned()));
+    settings.sensors = topics.collect();
+    settings.fixes_to.clone_from(&gnss.listen);
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::open(settings)?, scans)
 }

@@ -125,7 +125,7 @@ impl Trajectory {
         Ok(true)
     }
 
-    /// Takes the fixes that have arrived; at the end of the run all of them.
+    /// Uses the fixes that have arrived; at the end of the run all of them.
     fn take_live_fixes(&mut self) -> Result<(), RunError> {
         let Some(live) = &mut self.live_fixes else {
             return Ok(());
@@ -180,6 +180,9 @@ impl Follower for Trajectory {
     const LOGS: &'static [LogId] = &[LogId::Keyframes, LogId::Loops];
 
     fn step(&mut self) -> Result<Step<CorrectionHeader>, RunError> {
+        if let Some(live) = &mut self.live_fixes {
+            live.receiver.receive()?;
+        }
         if self.advance()? {
             return Ok(Step::Worked(None));
         }
@@ -205,7 +208,7 @@ impl Follower for Trajectory {
 
     fn sync(&mut self) -> Result<(), RunError> {
         let received = self.live_fixes.as_mut();
-        received.map_or(Ok(()), LiveFixes::finish)
+        received.map_or(Ok(()), |live| live.receiver.finish())
     }
 
     fn progress(&self) -> Progress {
@@ -228,26 +231,20 @@ impl LiveFixes {
     fn open(config: GnssConfig, out: &Path) -> Result<Self, RunError> {
         let log = received_fixes(out);
         Ok(Self {
-            receiver: GnssReceiver::open(&config.listen, &log)?,
+            receiver: GnssReceiver::open(&config, &log)?,
             received: ReceivedFixes::new(&log),
             examined: 0,
             config,
         })
     }
 
-    fn finish(&mut self) -> Result<(), RunError> {
-        self.receiver.finish()
-    }
-
     /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
     /// With `is_last` nothing is received after this.
     fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, RunError> {
         if is_last {
-            self.finish()?;
+            self.receiver.finish()?;
         }
-        let received = &mut self.received;
-        let read = self.receiver.if_grown(|| received.read_on())?;
-        read.unwrap_or(Ok(())).map_err(RunError::input)?;
+        self.received.read_on().map_err(RunError::input)?;
         let new = self.received.count() - self.examined;
         let least = if is_last {
             1

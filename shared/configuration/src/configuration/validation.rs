@@ -7,7 +7,7 @@ use gyre_contract::{
     StageId,
     run::{Mode, PlayedFault, PlayedFrom, Rate, Side, SourceKind, StageConfig},
 };
-use gyre_geometry::samples::{GnssKind, GyroKind, WheelsKind};
+use gyre_geometry::samples::SensorKind;
 use gyre_ros2_messages::Domain;
 use gyre_simulator::OutputFormat;
 use gyre_slam::SlamKind;
@@ -38,7 +38,7 @@ impl Configuration {
         within("run", self.run.scheduling.validate())?;
         self.validate_stages()?;
         self.validate_method()?;
-        self.validate_listen()?;
+        self.validate_sensors()?;
         self.validate_source()?;
         self.validate_parts()
     }
@@ -97,16 +97,11 @@ impl Configuration {
         Ok(())
     }
 
-    /// There are points where they are needed, a log that is used is named, and fixes are
-    /// constraints of a graph. The fixes of a recording are in a log. Those beside a live radar
+    /// There are points where they are needed, and fixes are constraints of a graph. The fixes of a recording are in a log. Those beside a live radar
     /// arrive during the run, or are in a log that is complete when it begins.
     fn validate_method(&self) -> Result<(), ConfigurationError> {
         let (odometry, slam, gnss) = (&self.odometry, &self.slam, &self.gnss);
-        let (gyro, wheels) = (&odometry.gyro, &odometry.wheels);
         let has_points = odometry.points.capacity > 0;
-        let is_named = |file: &Option<std::path::PathBuf>| {
-            file.as_ref().is_some_and(|it| !it.as_os_str().is_empty())
-        };
         refuse! {
             "points" if !has_points && self.has(StageId::Refinement) =>
                 "points.capacity is 0, but a refinement of kind `local-map` matches points: it must be 1 or more";
@@ -118,19 +113,13 @@ impl Configuration {
                 "submap_reach_m is out of its bounds: expected 0 to 50 m";
             "slam" if !slam.is_on() && !slam.map.as_os_str().is_empty() =>
                 "map is set, but slam makes the keyframes that are found in it: set kind to `graph`";
-            "gyro" if gyro.kind == GyroKind::Log && !is_named(&gyro.file) =>
-                "kind is `log`, but no file is named: set file, or kind to `auto`";
-            "wheels" if wheels.kind == WheelsKind::Log && !is_named(&wheels.file) =>
-                "kind is `log`, but no file is named: set file, or kind to `auto`";
-            "gnss" if gnss.kind == GnssKind::Log && !is_named(&gnss.file) =>
-                "kind is `log`, but no file is named: set file, or kind to `auto`";
-            "gnss" if gnss.kind != GnssKind::None && slam.kind != SlamKind::Graph =>
+            "gnss" if gnss.kind != SensorKind::None && slam.kind != SlamKind::Graph =>
                 "kind is set, but fixes are constraints of the graph of slam: set slam.kind to `graph`";
-            "gnss" if gnss.kind == GnssKind::Auto && self.is_radar() =>
+            "gnss" if gnss.kind == SensorKind::Auto && self.is_radar() =>
                 "kind is `auto`, but the log of a live radar does not lie beside its scans: receive fixes with kind = \"udp\" or \"ros2\", or name a log with kind = \"log\" and file";
-            "gnss" if gnss.kind == GnssKind::Udp && !self.is_radar() && !self.is_side(Side::Base) =>
+            "gnss" if gnss.kind == SensorKind::Udp && !self.is_radar() && !self.is_side(Side::Base) =>
                 "kind is `udp`, but the scans are of no live radar: set kind to `auto`, or name a log with kind = \"log\" and file";
-            "gnss" if gnss.kind == GnssKind::Ros2 && self.source.kind != SourceKind::Ros2 =>
+            "gnss" if gnss.kind == SensorKind::Ros2 && self.source.kind != SourceKind::Ros2 =>
                 "kind is `ros2`, but the radar is not behind its driver in ROS 2: receive fixes with kind = \"udp\", or name a log with kind = \"log\" and file";
             "objects" if self.objects.is_on() && self.link.side.is_some() =>
                 "kind is `tracks`, but a run that is split between two machines (link.side) logs no points: set kind to `none`";
@@ -138,17 +127,18 @@ impl Configuration {
         Ok(())
     }
 
-    fn validate_listen(&self) -> Result<(), ConfigurationError> {
-        let odometry = &self.odometry;
-        let (gyro, wheels, gnss) = (&odometry.gyro, &odometry.wheels, &self.gnss);
-        let sensors = [
-            ("gyro", gyro.kind == GyroKind::Udp, &gyro.listen),
-            ("wheels", wheels.kind == WheelsKind::Udp, &wheels.listen),
-            ("gnss", gnss.is_live(), &gnss.listen),
-        ];
+    /// A log that is used is named, and no two live sensors have one address.
+    fn validate_sensors(&self) -> Result<(), ConfigurationError> {
         let mut taken = BTreeMap::new();
-        for (section, _, listen) in sensors.into_iter().filter(|(_, is_live, _)| *is_live) {
-            if let Some(other) = taken.insert(listen, section) {
+        for sensor in self.sensors() {
+            let (section, listen) = (sensor.of().section(), sensor.listen());
+            let is_named = !sensor.file().as_os_str().is_empty();
+            if sensor.kind() == SensorKind::Log && !is_named {
+                let reason = "kind is `log`, but no file is named: set file, or kind to `auto`";
+                return Err(value(section, reason));
+            }
+            let before = sensor.receives().then(|| taken.insert(listen, section));
+            if let Some(other) = before.flatten() {
                 let reason = format!("listen is {listen}, as that of {other}: set another port");
                 return Err(value(section, reason));
             }

@@ -4,9 +4,8 @@ use toml::{Table, Value};
 
 use super::Configuration;
 
-/// Sections of sensors, and the kinds that give one of their keys an effect; the other keys have an
-/// effect with all kinds except `none`.
-const SENSORS: [&str; 3] = ["gyro", "wheels", "gnss"];
+/// The kinds of a sensor that give one of its keys an effect; the other keys have an effect with
+/// all kinds except `none`.
 const OF_KINDS: [(&str, &[&str]); 3] = [
     ("file", &["log"]),
     ("topic", &["auto", "ros2"]),
@@ -26,7 +25,8 @@ impl Configuration {
             let found = parts.try_fold(section_of, |value, part| value.get(part))?;
             let kind = found.get("kind").and_then(Value::as_str)?;
             let kinds = OF_KINDS.iter().find(|(of, _)| *of == key);
-            let kinds = kinds.filter(|_| SENSORS.contains(&section));
+            let kinds =
+                kinds.filter(|_| self.sensors().iter().any(|it| it.of().section() == section));
             let has_effect = match kinds {
                 Some((_, kinds)) => kinds.contains(&kind),
                 None => kind != "none" || key == "kind",

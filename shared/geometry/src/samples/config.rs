@@ -96,6 +96,28 @@ pub trait SensorConfig {
 
     fn topic(&self) -> Option<&str>;
 
+    /// The topic of a live sensor: if none is configured, the usual one.
+    fn live_topic(&self) -> &str;
+
+    /// The address for receiving datagrams.
+    fn listen(&self) -> &str;
+
+    /// Returns whether a run receives datagrams at that address. The source passes fixes of ROS 2 on
+    /// to there.
+    fn receives(&self) -> bool {
+        self.kind() == SensorKind::Udp || self.of() == SampleKind::Gnss && self.kind().is_live()
+    }
+
+    /// Longest time for which a scan of a live radar waits for its samples, ms.
+    fn max_wait_ms(&self) -> f64 {
+        0.0
+    }
+
+    /// Longest time between two samples over which a rate is interpolated, s.
+    fn max_gap_s(&self) -> f64 {
+        0.0
+    }
+
     /// Distance of one tick of a log that counts ticks, m.
     fn m_per_tick(&self) -> Option<f64> {
         None
@@ -119,7 +141,7 @@ pub(super) fn on_clock(sample: &Sample, delay_s: f64) -> i64 {
 
 /// Makes a section with `kind`, `file` and `topic` the settings of a kind of sensor.
 macro_rules! sensor_config {
-    ($config:ident is $of:ident: $($method:item)+) => {
+    ($config:ident is $of:ident on $live_topic:literal: $($method:item)+) => {
         impl $config {
             pub fn is_used(&self) -> bool {
                 self.kind.is_used()
@@ -145,6 +167,14 @@ macro_rules! sensor_config {
 
             fn topic(&self) -> Option<&str> {
                 self.topic.as_deref()
+            }
+
+            fn live_topic(&self) -> &str {
+                self.topic.as_deref().unwrap_or($live_topic)
+            }
+
+            fn listen(&self) -> &str {
+                &self.listen
             }
 
             $($method)+
@@ -249,7 +279,15 @@ impl GyroConfig {
     }
 }
 
-sensor_config! { GyroConfig is Gyro:
+sensor_config! { GyroConfig is Gyro on "/imu/data":
+    fn max_wait_ms(&self) -> f64 {
+        self.max_wait_ms
+    }
+
+    fn max_gap_s(&self) -> f64 {
+        self.max_gap_s
+    }
+
     fn up(&self) -> Option<UpAxis> {
         self.up
     }

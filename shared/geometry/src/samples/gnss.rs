@@ -79,7 +79,7 @@ impl GnssConfig {
     }
 }
 
-sensor_config! { GnssConfig is Gnss:
+sensor_config! { GnssConfig is Gnss on "/fix":
     /// Takes a fix over to the radar's clock, with the configured uncertainty where the log has
     /// none.
     fn on_radar(&self, sample: &Sample, _: Option<UpAxis>) -> Sample {

@@ -1,4 +1,4 @@
-use crate::samples::{Sample, SampleKind};
+use crate::samples::{Sample, SampleKind, SensorConfig};
 
 /// Turn of the radar assumed for a scan whose azimuths all have the same time, ns.
 const MIN_TURN_NS: i64 = 250_000_000;
@@ -10,8 +10,6 @@ const MIN_TURN_NS: i64 = 250_000_000;
 #[derive(Clone, Debug)]
 pub struct Integrator<C> {
     pub(crate) config: C,
-    kind: SampleKind,
-    value: usize,
     /// Longest time between two samples over which the rate is interpolated.
     max_gap_ns: i64,
     earlier: Option<Sweep>,
@@ -45,13 +43,11 @@ struct Sweep {
     mean: Option<f64>,
 }
 
-impl<C> Integrator<C> {
-    pub(crate) fn of(config: C, kind: SampleKind, value: usize, max_gap_s: f64) -> Self {
+impl<C: SensorConfig + Clone> Integrator<C> {
+    pub fn new(config: &C) -> Self {
         Self {
-            config,
-            kind,
-            value,
-            max_gap_ns: (max_gap_s * 1e9) as i64,
+            config: config.clone(),
+            max_gap_ns: (config.max_gap_s() * 1e9) as i64,
             earlier: None,
             later: None,
             dropped: Vec::new(),
@@ -64,7 +60,7 @@ impl<C> Integrator<C> {
     pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
         let mut sweep = self.earlier.take().unwrap_or_default();
         sweep.rates.clear();
-        sweep.rates.extend(rates(samples, self.kind, self.value));
+        sweep.rates.extend(rates(samples, self.config.of()));
         (sweep.stamp_ns, sweep.span_ns) = (stamp_ns, span_ns);
         sweep.mean = sweep.mean(self.max_gap_ns);
         self.earlier = self.later.replace(sweep);
@@ -74,7 +70,7 @@ impl<C> Integrator<C> {
 
     /// Takes the samples of a dropped scan: they count as samples of the next scan.
     pub fn drop_scan(&mut self, samples: &[Sample]) {
-        let rates = rates(samples, self.kind, self.value);
+        let rates = rates(samples, self.config.of());
         self.dropped.extend(rates);
     }
 
@@ -161,9 +157,9 @@ fn integral(rates: &[Rate], [from_ns, to_ns]: [i64; 2], max_gap_ns: i64) -> Opti
     (is_dense && covers).then_some(sum)
 }
 
-fn rates(samples: &[Sample], kind: SampleKind, value: usize) -> impl Iterator<Item = Rate> {
+fn rates(samples: &[Sample], kind: SampleKind) -> impl Iterator<Item = Rate> {
     let of_kind = samples.iter().filter(move |sample| sample.is(kind));
-    of_kind.map(move |sample| (sample.stamp_ns, sample.values[value]))
+    of_kind.map(move |sample| (sample.stamp_ns, sample.values[kind.rate()]))
 }
 
 /// The rate at a time, interpolated linearly; before the first sample and after the last, the
@@ -181,4 +177,117 @@ fn rate_at(rates: &[Rate], stamp_ns: i64) -> Option<f64> {
 
 fn seconds(ns: i64) -> f64 {
     ns as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::samples::{Gyro, GyroConfig, Wheels, WheelsConfig};
+
+    const MS: i64 = 1_000_000;
+    const SWEEP: i64 = 250 * MS;
+
+    /// Of sweep after sweep of 250 ms, each stamped in its middle.
+    fn of<C: SensorConfig + Clone + Default>(first_sweep: i64, scans: &[&[Rate]]) -> Integrator<C> {
+        let mut rates = Integrator::new(&C::default());
+        for (k, of_scan) in (first_sweep..).zip(scans) {
+            let span_ns = [k * SWEEP, (k + 1) * SWEEP];
+            rates.push(
+                &samples(rates.config.of(), of_scan),
+                k * SWEEP + SWEEP / 2,
+                span_ns,
+            );
+        }
+        rates
+    }
+
+    /// The samples of these rates, and between them those of all other kinds.
+    fn samples(of: SampleKind, rates: &[Rate]) -> Vec<Sample> {
+        let sample = |(ns, rate): &Rate| {
+            SampleKind::OF_SCANS.map(|kind| {
+                let value = if kind == of { *rate } else { 9.0 };
+                Sample::of(kind, *ns, [value; 6])
+            })
+        };
+        rates.iter().flat_map(sample).collect()
+    }
+
+    /// Samples of a rate that grows evenly, from one time to another, ms.
+    fn ramp(from: i64, to: i64, every: usize) -> Vec<Rate> {
+        let stamps = (from..=to).step_by(every);
+        stamps.map(|ms| (ms * MS, 1e-3 * ms as f64)).collect()
+    }
+
+    fn split(all: &[Rate]) -> [&[Rate]; 2] {
+        let (before, after) = all.split_at(all.partition_point(|(ns, _)| *ns <= 250 * MS));
+        [before, after]
+    }
+
+    proptest! {
+        /// A rate that grows evenly is integrated exactly, whatever the stamps of the samples.
+        #[test]
+        fn a_turn_and_a_distance_are_the_integrals_of_their_rates(
+            first in 0i64..100, every in 1usize..100, times in -30.0..30.0f64,
+        ) {
+            let all = ramp(first, 501, every);
+            let turn = of::<GyroConfig>(0, &split(&all)).turn().unwrap_or_default();
+            prop_assert!((turn.yaw_rad - 0.25 * 0.25).abs() < 1e-9, "{turn:?}");
+            // At the ends of a sweep the nearest sample holds.
+            let off = turn.sweep_rate_radps - 0.375;
+            prop_assert!(off.abs() < 1e-3 * every as f64, "{turn:?}");
+            prop_assert_eq!(turn.interval_s, 0.25);
+            let driven: Vec<Rate> = all.iter().map(|(ns, rate)| (*ns, times * rate)).collect();
+            let distance = of::<WheelsConfig>(0, &split(&driven)).distance().unwrap_or_default();
+            prop_assert!((distance.distance_m - times * 0.25 * 0.25).abs() < 1e-9, "{distance:?}");
+            let noise = WheelsConfig::default().noise_m_per_sqrt_m;
+            let least = noise.powi(2) * distance.distance_m.abs();
+            prop_assert!(distance.variance_m2 > least && distance.side_variance_m2 == least);
+        }
+    }
+
+    #[test]
+    fn a_process_that_starts_at_the_scan_before_says_the_same() {
+        let scans = [0, 250, 500].map(|from| ramp(from + 3, from + 250, 7));
+        let from = |first: usize| -> Gyro {
+            let scans: Vec<&[Rate]> = scans[first..].iter().map(Vec::as_slice).collect();
+            of(first as i64, &scans)
+        };
+        let [whole, late, alone] = [0, 1, 2].map(from);
+        assert!(whole.turn().is_some());
+        assert_eq!(whole.turn(), late.turn());
+        assert_eq!(alone.turn(), None);
+        assert_eq!(whole.sweep_rates_radps()[1], alone.sweep_rates_radps()[1]);
+    }
+
+    #[test]
+    fn nothing_is_made_up_where_samples_are_missing() {
+        let all = ramp(0, 500, 10);
+        let turn_without = |lost: std::ops::Range<i64>| {
+            let is_kept = |(ns, _): &Rate| !lost.contains(&(ns / MS));
+            let kept: Vec<Rate> = all.iter().copied().filter(is_kept).collect();
+            of::<GyroConfig>(0, &split(&kept)).turn()
+        };
+        assert!(turn_without(0..0).is_some() && turn_without(200..300).is_some());
+        for lost in [200..330, 0..250, 370..501, 0..501] {
+            assert_eq!(turn_without(lost.clone()), None, "{lost:?}");
+        }
+    }
+
+    #[test]
+    fn samples_of_a_dropped_scan_are_those_of_the_next_one() {
+        let [first, second, third] = [0, 250, 500].map(|from| ramp(from + 1, from + 250, 10));
+        let after_first = |dropped: &[Rate], next: &[Rate]| {
+            let mut wheels: Wheels = of(0, &[&first]);
+            wheels.drop_scan(&samples(SampleKind::Wheels, dropped));
+            let span_ns = [500 * MS, 750 * MS];
+            wheels.push(&samples(SampleKind::Wheels, next), 625 * MS, span_ns);
+            (wheels.integral, wheels.means())
+        };
+        let live = after_first(&second, &third);
+        let driven = live.0.map_or(0.0, |integral| integral.sum);
+        assert!((driven - 0.5 * 0.375).abs() < 1e-3, "{driven}");
+        assert_eq!(live, after_first(&[], &[second, third].concat()));
+    }
 }

@@ -1,6 +1,6 @@
 //! Samples of a live gyro or of live wheels, until the scan comes that they go with.
 
-use crate::samples::{GyroConfig, MAX_SAMPLES, Sample, SensorConfig, WheelsConfig, interval_of};
+use crate::samples::{MAX_SAMPLES, Sample, SensorConfig, interval_of};
 
 /// A sample that is so much later than the last scan, or before the first scan so far from the
 /// newest sample, is of a clock that has jumped, ns.
@@ -8,27 +8,10 @@ const MAX_AHEAD_NS: i64 = 10_000_000_000;
 /// Maximum number of samples that wait: ten seconds at 1600 Hz.
 const MAX_WAITING: usize = 16 * MAX_SAMPLES;
 
-/// The sensor that the samples are of, by whose settings they are taken over to the radar's clock.
-#[derive(Clone, Debug)]
-pub enum LiveSensor {
-    Gyro(GyroConfig),
-    Wheels(WheelsConfig),
-}
-
-impl LiveSensor {
-    fn on_radar(&self, sample: &Sample) -> Sample {
-        match self {
-            Self::Gyro(config) => config.on_radar(sample, None),
-            Self::Wheels(config) => config.on_radar(sample, None),
-        }
-    }
-}
-
 /// Samples that have arrived, in the order of their stamps. Which of them go with a scan is decided
 /// by their stamps; when they arrived decides only whether they are late.
-#[derive(Clone, Debug)]
 pub struct LiveSamples {
-    sensor: LiveSensor,
+    config: Box<dyn SensorConfig>,
     samples: Vec<Sample>,
     /// The end of the last scan, ns.
     handed_until_ns: Option<i64>,
@@ -36,9 +19,10 @@ pub struct LiveSamples {
 }
 
 impl LiveSamples {
-    pub fn new(sensor: LiveSensor) -> Self {
+    /// Waits for samples that these settings take over to the radar's clock.
+    pub fn new(config: Box<dyn SensorConfig>) -> Self {
         Self {
-            sensor,
+            config,
             samples: Vec::new(),
             handed_until_ns: None,
             left_out: 0,
@@ -49,7 +33,7 @@ impl LiveSamples {
     /// used is left out, and counted: no number, a rate or a speed beyond any, a stamp that there
     /// was already, one of a scan that is gone, or one far ahead of the radar's.
     pub fn add(&mut self, sample: &Sample) {
-        let sample = self.sensor.on_radar(sample);
+        let sample = self.config.on_radar(sample, None);
         let place = self
             .samples
             .partition_point(|it| it.stamp_ns < sample.stamp_ns);
@@ -113,12 +97,13 @@ impl LiveSamples {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::samples::{GyroConfig, UpAxis, WheelsConfig};
     use proptest::prelude::*;
 
     const MS: i64 = 1_000_000;
 
-    fn of_gyro(config: GyroConfig) -> LiveSamples {
-        LiveSamples::new(LiveSensor::Gyro(config))
+    fn of_gyro() -> LiveSamples {
+        LiveSamples::new(Box::<GyroConfig>::default())
     }
 
     fn stamps(samples: &[Sample]) -> Vec<i64> {
@@ -129,7 +114,7 @@ mod tests {
         /// Whatever the order of arrival, each scan has the samples of its interval.
         #[test]
         fn stamps_alone_decide(order in Just((1..=50i64).collect::<Vec<_>>()).prop_shuffle()) {
-            let mut live = of_gyro(GyroConfig::default());
+            let mut live = of_gyro();
             order.iter().for_each(|ms| live.add(&Sample::yaw_rate(10 * ms * MS, 0.1)));
             for sweep in [[5 * MS, 255 * MS], [255 * MS, 505 * MS]] {
                 let [after, until] = interval_of(sweep).map(|ns| ns / MS);
@@ -144,7 +129,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_used_is_left_out_and_counted() {
-        let mut live = of_gyro(GyroConfig::default());
+        let mut live = of_gyro();
         live.of_scan([0, 100 * MS]);
         for (stamp_ns, rate) in [
             (100 * MS, 0.1),    // of the scan that is gone
@@ -170,7 +155,7 @@ mod tests {
         for (before, ahead, after, lost) in
             [(100, 2500, 100, 0), (0, 2500, 100, 100), (0, 0, 12_000, 0)]
         {
-            let mut live = of_gyro(GyroConfig::default());
+            let mut live = of_gyro();
             let mut add = |from_ns: i64, count: i64| {
                 (1..=count).for_each(|k| live.add(&Sample::yaw_rate(from_ns + k * MS, 0.1)));
             };
@@ -187,7 +172,7 @@ mod tests {
                 (expected, ahead + lost)
             );
         }
-        let mut flooded = of_gyro(GyroConfig::default());
+        let mut flooded = of_gyro();
         (1..=20_000).for_each(|k| flooded.add(&Sample::yaw_rate(k, 0.1)));
         let (samples, left_out) = flooded.of_scan([0, MS]);
         assert_eq!(
@@ -197,29 +182,27 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_put_on_the_radars_clock_and_axes() {
-        let mut live = of_gyro(GyroConfig {
+    fn samples_are_put_on_the_radars_clock_and_axes_and_scaled() {
+        let mut gyro = LiveSamples::new(Box::new(GyroConfig {
             delay_s: 0.1,
-            up: Some(crate::samples::UpAxis::MinusZ),
+            up: Some(UpAxis::MinusZ),
             ..GyroConfig::default()
-        });
-        live.add(&Sample::yaw_rate(200 * MS, -0.5));
-        let (samples, _) = live.of_scan([0, 100 * MS]);
-        assert_eq!(samples, [Sample::yaw_rate(100 * MS, 0.5)]);
-    }
-
-    #[test]
-    fn speeds_are_put_on_the_radars_clock_and_scaled() {
-        let mut live = LiveSamples::new(LiveSensor::Wheels(WheelsConfig {
+        }));
+        let mut wheels = LiveSamples::new(Box::new(WheelsConfig {
             delay_s: 0.1,
             scale: 1.02,
             ..WheelsConfig::default()
         }));
+        gyro.add(&Sample::yaw_rate(200 * MS, -0.5));
         for speed in [10.0, f64::INFINITY, 1e3] {
-            live.add(&Sample::speed(200 * MS, speed));
+            wheels.add(&Sample::speed(200 * MS, speed));
         }
-        let (samples, left_out) = live.of_scan([0, 100 * MS]);
-        assert_eq!(samples, [Sample::speed(100 * MS, 10.2)]);
-        assert_eq!(left_out, 2);
+        for (mut live, expected, lost) in [
+            (gyro, Sample::yaw_rate(100 * MS, 0.5), 0),
+            (wheels, Sample::speed(100 * MS, 10.2), 2),
+        ] {
+            let (samples, left_out) = live.of_scan([0, 100 * MS]);
+            assert_eq!((samples, left_out), (&[expected][..], lost));
+        }
     }
 }

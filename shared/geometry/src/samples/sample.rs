@@ -41,13 +41,55 @@ pub enum SampleKind {
     Gnss = 3,
 }
 
+/// What is known of a kind of samples.
+struct Row {
+    section: &'static str,
+    /// The numbers of values that a line of a datagram can have; none of a kind whose lines can be
+    /// without a measurement.
+    counts: &'static [usize],
+    /// The values at the front that are bounded, and their bound; `None`: it travels with no scan.
+    bounded: Option<(usize, f64)>,
+    /// The value that is integrated from scan to scan.
+    rate: usize,
+}
+
 impl SampleKind {
-    pub const fn section(self) -> &'static str {
-        match self {
-            Self::Gyro => "gyro",
-            Self::Wheels => "wheels",
-            Self::Gnss => "gnss",
+    /// The kinds whose samples travel with the scans.
+    pub const OF_SCANS: [Self; 2] = [Self::Gyro, Self::Wheels];
+
+    const fn row(self) -> Row {
+        let (section, counts, bounded, rate): (_, &[usize], _, _) = match self {
+            Self::Gyro => ("gyro", &[3, 6], Some((3, MAX_RATE_RADPS)), 2),
+            Self::Wheels => ("wheels", &[1], Some((1, MAX_SPEED_MPS)), 0),
+            Self::Gnss => ("gnss", &[], None, 0),
+        };
+        Row {
+            section,
+            counts,
+            bounded,
+            rate,
         }
+    }
+
+    pub const fn section(self) -> &'static str {
+        self.row().section
+    }
+
+    pub(super) const fn rate(self) -> usize {
+        self.row().rate
+    }
+
+    /// Parses a line of a datagram: a stamp, ns, and the values in their order, with commas
+    /// between. `None`: it is no sample.
+    pub fn parse(self, line: &str) -> Option<Sample> {
+        let (stamp_ns, rest) = line.split_once(',')?;
+        let parsed: Result<Vec<f64>, _> = rest.split(',').map(|it| it.trim().parse()).collect();
+        let parsed = parsed
+            .ok()
+            .filter(|it| self.row().counts.contains(&it.len()))?;
+        let mut values = [0.0; 6];
+        values[..parsed.len()].copy_from_slice(&parsed);
+        Some(Sample::of(self, stamp_ns.trim().parse().ok()?, values))
     }
 }
 
@@ -107,11 +149,14 @@ impl Sample {
     /// Returns whether it can travel with a scan: its kind does, all its values are finite, and its
     /// rates are within [`MAX_RATE_RADPS`], its speed within [`MAX_SPEED_MPS`].
     pub fn is_valid(&self) -> bool {
-        let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
-        let are_finite = self.values.iter().all(|value| value.is_finite());
-        let is_measured = (self.is(SampleKind::Gyro) && within(&self.values[..3], MAX_RATE_RADPS))
-            || (self.is(SampleKind::Wheels) && within(&self.values[..1], MAX_SPEED_MPS));
-        are_finite && is_measured
+        let mut kinds = SampleKind::OF_SCANS.into_iter();
+        let row = kinds.find(|kind| self.is(*kind)).map(SampleKind::row);
+        let is_measured = row
+            .and_then(|row| row.bounded)
+            .is_some_and(|(count, most)| {
+                self.values[..count].iter().all(|value| value.abs() <= most)
+            });
+        is_measured && self.values.iter().all(|value| value.is_finite())
     }
 
     /// Returns the key of the order of samples on the way: by their stamps, and for one stamp by
@@ -140,6 +185,50 @@ impl From<Vec<Sample>> for Logged {
         Self {
             samples,
             ..Self::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SampleKind::*, *};
+
+    #[test]
+    fn a_line_is_a_sample_of_its_kind_or_none() {
+        let stamp = 1_700_000_000_000_000_001;
+        let rates = |values| Some(Sample::of(Gyro, stamp, values));
+        for (kind, line, expected) in [
+            (
+                Gyro,
+                "1700000000000000001, 0.1,-0.2,0.3",
+                rates([0.1, -0.2, 0.3, 0.0, 0.0, 0.0]),
+            ),
+            (
+                Gyro,
+                " 1700000000000000001,0,0,1e-3,0.5,0,9.8 ",
+                rates([0.0, 0.0, 1e-3, 0.5, 0.0, 9.8]),
+            ),
+            (
+                Wheels,
+                "1700000000000000001, 8.25",
+                Some(Sample::speed(stamp, 8.25)),
+            ),
+            (Wheels, "17,-1", Some(Sample::speed(17, -1.0))),
+        ] {
+            assert_eq!(kind.parse(line), expected, "{kind:?}: {line}");
+        }
+        let of_gyro = [
+            "1.5,0,0,0",
+            "17,0,0",
+            "17,0,0,0,1",
+            "17,0,0,0,1,2,3,4",
+            "17,0,x,0",
+        ];
+        let of_wheels = ["17,x", "1.5,3", "17,3,4"];
+        for (kind, lines) in [(Gyro, &of_gyro[..]), (Wheels, &of_wheels)] {
+            for line in ["hello", "17", "17,"].iter().chain(lines) {
+                assert_eq!(kind.parse(line), None, "{kind:?}: {line}");
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 use bytemuck::{Pod, Zeroable};
 
-use crate::samples::{SampleKind, WheelsConfig, integral::Integrator};
+use crate::samples::{WheelsConfig, integral::Integrator};
 
 /// Standard deviation of a speed by the rounding to a step, m/s.
 const NOISE_MPS: f64 = 0.02;
@@ -20,10 +20,6 @@ pub struct WheelDistance {
 pub type Wheels = Integrator<WheelsConfig>;
 
 impl Wheels {
-    pub fn new(config: &WheelsConfig) -> Self {
-        Self::of(config.clone(), SampleKind::Wheels, 0, config.max_gap_s)
-    }
-
     /// Returns the distance from the stamp of the scan before to the stamp of the scan; `None`
     /// where samples are missing.
     pub fn distance(&self) -> Option<WheelDistance> {
@@ -40,44 +36,5 @@ impl Wheels {
             side_variance_m2: of_rolling,
             interval_s: integral.interval_s,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::samples::Sample;
-    use proptest::prelude::*;
-
-    const MS: i64 = 1_000_000;
-
-    fn wheels(samples: [&[Sample]; 2]) -> Wheels {
-        let mut wheels = Wheels::new(&WheelsConfig::default());
-        for (sweep, samples) in (0..).zip(samples) {
-            let [start, end] = [sweep * 250 * MS, (sweep + 1) * 250 * MS];
-            wheels.push(samples, start + 125 * MS, [start, end]);
-        }
-        wheels
-    }
-
-    proptest! {
-        /// A speed that grows evenly is integrated exactly, and samples of a gyro between are not
-        /// looked at.
-        #[test]
-        fn the_distance_is_the_integral_of_the_speed(
-            first in 0i64..100, every in 1usize..100, speed in -30.0..30.0f64,
-        ) {
-            let sample = |ms: i64| {
-                let speed_mps = speed * (1.0 + 1e-3 * ms as f64);
-                [Sample::yaw_rate(ms * MS, 9.0), Sample::speed(ms * MS, speed_mps)]
-            };
-            let all: Vec<Sample> = (first..=501).step_by(every).flat_map(sample).collect();
-            let (before, after) = all.split_at(all.partition_point(|it| it.stamp_ns <= 250 * MS));
-            let distance = wheels([before, after]).distance().unwrap_or_default();
-            prop_assert!((distance.distance_m - 0.25 * speed * 1.25).abs() < 1e-9, "{distance:?}");
-            let config = WheelsConfig::default();
-            let least = config.noise_m_per_sqrt_m.powi(2) * distance.distance_m.abs();
-            prop_assert!(distance.variance_m2 > least && distance.side_variance_m2 == least);
-        }
     }
 }

@@ -89,7 +89,15 @@ impl WheelsConfig {
     }
 }
 
-sensor_config! { WheelsConfig is Wheels:
+sensor_config! { WheelsConfig is Wheels on "/odom":
+    fn max_wait_ms(&self) -> f64 {
+        self.max_wait_ms
+    }
+
+    fn max_gap_s(&self) -> f64 {
+        self.max_gap_s
+    }
+
     fn m_per_tick(&self) -> Option<f64> {
         self.m_per_tick
     }

@@ -141,9 +141,11 @@ fn used(estimator: &TrajectoryEstimator) -> usize {
 }
 
 #[test]
-fn the_drive_lies_where_the_fixes_say_and_drifts_no_more() {
+fn the_drive_lies_where_the_fixes_say_and_all_fixes_are_counted_once() {
     let drive = Drive::new(900, 1);
-    let mut estimator = drive.solved(drive.fixes(2));
+    let fixes = drive.fixes(2);
+    let all = fixes.len();
+    let mut estimator = drive.solved(fixes);
     let reckoned = drive.keyframes[899].pose.motion;
     let drift_m = (reckoned.translation.vector - drive.truth[899].translation.vector).norm();
     assert!(drift_m > 3.0, "{drift_m}");
@@ -151,30 +153,19 @@ fn the_drive_lies_where_the_fixes_say_and_drifts_no_more() {
         let error_m = drive.error_m(&mut estimator, keyframe);
         assert!(error_m < 0.6, "{keyframe}: {error_m}");
     }
-    assert!(estimator.fixes().refusal().is_none());
+    let fixes = estimator.fixes();
+    assert!(fixes.refusal().is_none());
     assert!(
-        estimator
-            .fixes()
+        fixes
             .clock()
             .is_some_and(|clock| clock.delay_s.abs() < 0.15)
     );
-}
-
-#[test]
-fn all_fixes_are_counted_once() {
-    let drive = Drive::new(300, 1);
-    let fixes = drive.fixes(2);
-    let all = fixes.len();
-    let estimator = drive.solved(fixes);
-    let counts = estimator.fixes().counts();
-    assert_eq!(
-        counts.outside + counts.thinned + counts.far + counts.taken,
-        all
-    );
+    let counts = fixes.counts();
+    let counted = counts.outside + counts.thinned + counts.far + counts.taken;
+    assert_eq!((counted, fixes.positions().len()), (all, counts.taken));
     // Two seconds before and after, and the stop of 20 s.
     assert!((38..=42).contains(&counts.outside), "{counts:?}");
     assert!(counts.far > 150 && counts.taken > 200, "{counts:?}");
-    assert_eq!(estimator.fixes().positions().len(), counts.taken);
 }
 
 /// The time of a reflection.
@@ -321,6 +312,12 @@ fn fixes_that_arrive_with_the_keyframes_and_late_lead_to_the_same_solution() {
     let whole = drive.solved(all);
     assert_eq!(live.poses(), whole.poses());
     assert_eq!(live.positions(), whole.positions());
+    // All are taken back.
+    assert!(live.replace_fixes(of_receiver(Vec::new())));
+    live.update().unwrap();
+    assert_eq!(live.positions(), []);
+    live.solve().unwrap();
+    assert_eq!(live.poses(), drive.solved(Vec::new()).poses());
 }
 
 /// Of the fixes around a keyframe the one that is known best is taken, which may be the last one.
@@ -342,16 +339,4 @@ fn a_fix_that_is_taken_stays_however_late_the_fixes_are() {
         before = taken;
     }
     assert!(before.len() > 250, "{}", before.len());
-}
-
-#[test]
-fn fixes_that_are_taken_back_leave_the_odometry() {
-    let drive = Drive::new(100, 1);
-    let mut live = drive.solved(drive.fixes(2));
-    assert!(used(&live) > 50);
-    assert!(live.replace_fixes(of_receiver(Vec::new())));
-    live.update().unwrap();
-    assert_eq!(live.positions(), []);
-    live.solve().unwrap();
-    assert_eq!(live.poses(), drive.solved(Vec::new()).poses());
 }

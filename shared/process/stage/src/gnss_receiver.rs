@@ -2,20 +2,15 @@
 //! corrected trajectory uses that log.
 
 use std::{
-    io::{self, ErrorKind},
-    net::UdpSocket,
+    mem,
     path::Path,
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
+use gyre_geometry::samples::SensorConfig;
 use gyre_storage::{File, GroupSync, StorageError};
 
-use crate::datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive};
+use crate::datagrams::Receiver;
 use gyre_transport::RunError;
 
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
@@ -26,84 +21,96 @@ const MAX_ROWS: usize = 5000;
 const OF: Duration = Duration::from_secs(10);
 /// Maximum size of the log, bytes: several days of fixes.
 const MAX_LOG: u64 = 1 << 30;
-const WAIT: Duration = Duration::from_millis(50);
 
-/// Receives fixes in a thread of its own, so that no fix waits while the trajectory is solved, and
-/// appends a row for each line of a datagram, in the order of arrival.
+/// Receives fixes, and appends a row for each line of a datagram, in the order of arrival. The
+/// socket holds the fixes of ten seconds while nobody asks for them.
 pub struct GnssReceiver {
-    thread: Option<JoinHandle<Result<(), RunError>>>,
-    shared: Arc<Shared>,
-    read: Option<u64>,
-}
-
-struct Shared {
-    ends: AtomicBool,
-    /// Datagrams in the log. It is written and read while this is locked.
-    datagrams: Mutex<u64>,
-}
-
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, u64> {
-        self.datagrams
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
+    receiver: Receiver,
+    log: Log,
+    /// Rows since that time, and lines for which the log had no room and which it does not count
+    /// yet.
+    since: Instant,
+    rows: usize,
+    surplus: usize,
+    has_arrived: bool,
+    has_ended: bool,
 }
 
 impl GnssReceiver {
-    /// Receives at an address, and continues the log if there is one.
-    pub fn open(address: &str, log: &Path) -> Result<Self, RunError> {
-        let socket = listen("fixes of GNSS", "gnss", address)?;
-        let log = Log::open(log)?;
-        let timeout = socket.set_read_timeout(Some(WAIT));
-        timeout.map_err(|error| RunError::transport("receive fixes", error))?;
-        let shared = Arc::new(Shared {
-            ends: AtomicBool::new(false),
-            datagrams: Mutex::new(0),
-        });
-        let reception = Reception {
-            socket,
+    /// Receives at the address of the section, and continues the log if there is one.
+    pub fn open(sensor: &dyn SensorConfig, log: &Path) -> Result<Self, RunError> {
+        let receiver = Receiver::open(sensor)?;
+        let (log, address) = (Log::open(log)?, sensor.listen());
+        tracing::info!(address, "waiting for fixes of GNSS");
+        Ok(Self {
+            receiver,
             log,
-            shared: shared.clone(),
             since: Instant::now(),
             rows: 0,
             surplus: 0,
-        };
-        tracing::info!(address, "waiting for fixes of GNSS");
-        let stage = tracing::Span::current();
-        Ok(Self {
-            thread: Some(thread::spawn(move || stage.in_scope(|| reception.run()))),
-            shared,
-            read: None,
+            has_arrived: false,
+            has_ended: false,
         })
     }
 
-    /// Returns what `read` makes of the log, which meanwhile does not change; `None` if it has not
-    /// grown since the last call.
-    pub fn if_grown<T>(&mut self, read: impl FnOnce() -> T) -> Result<Option<T>, RunError> {
-        if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
-            self.finish()?;
+    /// Appends the fixes that have arrived, at most one turn of them.
+    pub fn receive(&mut self) -> Result<(), RunError> {
+        if self.has_ended {
+            return Ok(());
         }
-        let datagrams = self.shared.lock();
-        let is_read = self.read.replace(*datagrams) == Some(*datagrams);
-        Ok((!is_read).then(read))
+        let mut rows = String::new();
+        if self.since.elapsed() >= OF {
+            rows += &self.surplus();
+            (self.since, self.rows) = (Instant::now(), 0);
+        }
+        let (mut has_arrived, mut room) = (false, MAX_ROWS.saturating_sub(self.rows));
+        if self.log.end >= MAX_LOG {
+            room = 0;
+        }
+        let surplus = &mut self.surplus;
+        self.receiver.receive(|line| {
+            has_arrived = true;
+            if line.trim().is_empty() {
+                return;
+            }
+            match room {
+                0 => *surplus += 1,
+                _ => {
+                    room -= 1;
+                    rows += row(line).as_deref().unwrap_or(UNREADABLE);
+                }
+            }
+        })?;
+        self.rows = MAX_ROWS - room;
+        if has_arrived && !mem::replace(&mut self.has_arrived, true) {
+            tracing::info!("fixes of GNSS arrive");
+        }
+        if rows.is_empty() {
+            return Ok(());
+        }
+        self.log.append(&rows)?;
+        Ok(self.log.sync.changed()?)
     }
 
-    /// Takes all received datagrams, and ends reception: the log does not change any more.
+    /// Takes the received datagrams, and ends reception: the log does not change any more.
     pub fn finish(&mut self) -> Result<(), RunError> {
-        self.shared.ends.store(true, Ordering::Relaxed);
-        match self.thread.take().map(JoinHandle::join) {
-            None => Ok(()),
-            Some(Ok(ended)) => ended,
-            Some(Err(_)) => Err(RunError::transport("receive fixes", "the thread has ended")),
+        self.receive()?;
+        if mem::replace(&mut self.has_ended, true) {
+            return Ok(());
         }
+        if let lost @ 1.. = self.receiver.newly_dropped() {
+            tracing::warn!(lost, "datagrams with fixes came faster than they are read");
+        }
+        let surplus = self.surplus();
+        self.log.append(&surplus)?;
+        Ok(self.log.sync.finish()?)
     }
-}
 
-impl Drop for GnssReceiver {
-    fn drop(&mut self) {
-        // Who drops it does not need the log.
-        let _ = self.finish();
+    fn surplus(&mut self) -> String {
+        match mem::take(&mut self.surplus) {
+            0 => String::new(),
+            surplus => format!("unreadable,{surplus}\n"),
+        }
     }
 }
 
@@ -139,81 +146,6 @@ impl Log {
     }
 }
 
-struct Reception {
-    socket: UdpSocket,
-    log: Log,
-    shared: Arc<Shared>,
-    /// Rows since that time, and lines for which the log had no room and which it does not count
-    /// yet.
-    since: Instant,
-    rows: usize,
-    surplus: usize,
-}
-
-impl Reception {
-    fn run(mut self) -> Result<(), RunError> {
-        let failed = |error: io::Error| RunError::transport("receive fixes", error);
-        let mut datagram = vec![0; MAX_DATAGRAM];
-        let mut has_arrived = false;
-        self.socket.set_nonblocking(false).map_err(failed)?;
-        while !self.shared.ends.load(Ordering::Relaxed) {
-            match self.socket.recv(&mut datagram) {
-                Ok(bytes) => {
-                    self.append(&datagram[..bytes])?;
-                    if !std::mem::replace(&mut has_arrived, true) {
-                        tracing::info!("fixes of GNSS arrive");
-                    }
-                }
-                Err(error) => match error.kind() {
-                    ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut => {}
-                    _ => return Err(failed(error)),
-                },
-            }
-        }
-        // At the end only the waiting datagrams are read, because a receiver continues to send.
-        self.socket.set_nonblocking(true).map_err(failed)?;
-        let mut left = TURN_BYTES;
-        while let Some(bytes) = receive(&self.socket, &mut datagram, &mut left)? {
-            self.append(&datagram[..bytes])?;
-        }
-        if let lost @ 1.. = dropped(&self.socket) {
-            tracing::warn!(lost, "datagrams with fixes came faster than they are read");
-        }
-        let surplus = self.surplus();
-        self.log.append(&surplus)?;
-        Ok(self.log.sync.finish()?)
-    }
-
-    fn surplus(&mut self) -> String {
-        match std::mem::take(&mut self.surplus) {
-            0 => String::new(),
-            surplus => format!("unreadable,{surplus}\n"),
-        }
-    }
-
-    fn append(&mut self, datagram: &[u8]) -> Result<(), RunError> {
-        let lines = lines(datagram).filter(|line| !line.trim().is_empty());
-        let mut rows = String::new();
-        if self.since.elapsed() >= OF {
-            rows += &self.surplus();
-            (self.since, self.rows) = (Instant::now(), 0);
-        }
-        for line in lines {
-            self.rows += 1;
-            match self.rows <= MAX_ROWS && self.log.end < MAX_LOG {
-                true => rows += row(line).as_deref().unwrap_or(UNREADABLE),
-                false => self.surplus += 1,
-            }
-        }
-        let mut datagrams = self.shared.lock();
-        self.log.append(&rows)?;
-        *datagrams += 1;
-        // Readers do not wait for the disk.
-        drop(datagrams);
-        Ok(self.log.sync.changed()?)
-    }
-}
-
 /// Returns the row of a line: a stamp, ns, latitude and longitude, degrees (both empty without a
 /// fix), and the standard deviation, m, if the receiver knows it. `None`: it is no fix.
 fn row(line: &str) -> Option<String> {
@@ -239,7 +171,9 @@ fn row(line: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::{fs, net::UdpSocket};
+
+    use gyre_geometry::samples::GnssConfig;
 
     use super::*;
 
@@ -282,41 +216,32 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let log = folder.path().join("gnss.csv");
         let address = free_address();
-        let mut receiver = GnssReceiver::open(&address, &log).unwrap();
+        let gnss = GnssConfig {
+            listen: address.clone(),
+            ..GnssConfig::default()
+        };
+        let mut receiver = GnssReceiver::open(&gnss, &log).unwrap();
         let read = || fs::read_to_string(&log).unwrap();
-        assert_eq!(
-            receiver.if_grown(read).unwrap().as_deref(),
-            Some(HEADER),
-            "what an earlier one has left counts too"
-        );
-        assert_eq!(receiver.if_grown(read).unwrap(), None);
+        assert_eq!(read(), HEADER);
         send(&address, &[b"1,2,3\n2,2,3,4\n\n", b"\xff"]);
-        receiver.finish().unwrap();
+        receiver.receive().unwrap();
         let expected = format!("{HEADER}1,2,3,0\n2,2,3,4\n{UNREADABLE}");
-        assert_eq!(
-            receiver.if_grown(read).unwrap().as_deref(),
-            Some(&*expected)
-        );
-        let mut flooded = GnssReceiver::open(&address, &log).unwrap();
+        assert_eq!(read(), expected);
+        receiver.finish().unwrap();
+        drop(receiver);
+        let mut flooded = GnssReceiver::open(&gnss, &log).unwrap();
         send(&address, &[b"7\n".repeat(20_000).as_slice()]);
         flooded.finish().unwrap();
+        send(&address, &[b"9,2,3"]);
+        flooded.finish().unwrap();
+        drop(flooded);
         let text = read();
         assert_eq!(text.lines().count(), 4 + MAX_ROWS + 1);
         assert!(text.ends_with("unreadable,15000\n"));
         fs::write(&log, format!("{HEADER}1,2,3,0\n2,2,")).unwrap();
-        let mut next = GnssReceiver::open(&address, &log).unwrap();
+        let mut next = GnssReceiver::open(&gnss, &log).unwrap();
         send(&address, &[b"3,2,3"]);
         next.finish().unwrap();
         assert_eq!(read(), format!("{HEADER}1,2,3,0\n2,2,\n3,2,3,0\n"));
-    }
-
-    #[test]
-    fn an_address_that_another_one_has_is_named() {
-        let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
-        let address = taken.local_addr().unwrap().to_string();
-        let folder = tempfile::tempdir().unwrap();
-        let refused = GnssReceiver::open(&address, &folder.path().join("gnss.csv"));
-        let refused = refused.err().unwrap().to_string();
-        assert!(refused.contains(&address) && refused.contains("gnss.listen"));
     }
 }

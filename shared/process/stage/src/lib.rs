@@ -14,7 +14,7 @@
 #![allow(unsafe_code)]
 
 pub mod counters;
-mod datagrams;
+pub mod datagrams;
 pub mod follower;
 mod gnss_receiver;
 pub mod inputs;

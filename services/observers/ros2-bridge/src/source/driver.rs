@@ -67,6 +67,8 @@ impl PacketMessage {
 
 /// Takes the next message of the azimuths' topic, whatever its type.
 type TakePacket = Box<dyn Fn() -> Result<Option<Packet>, ReadError>>;
+/// Takes the next sample of a topic.
+type TakeSample = Box<dyn Fn() -> Option<Sample>>;
 
 pub struct Driver {
     node: Node,
@@ -79,8 +81,7 @@ pub struct Driver {
     azimuths: Option<TakePacket>,
     /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
     pub sample_wakeups: Wakeups,
-    gyro: Option<Subscription<Imu>>,
-    wheels: Option<Subscription<Odometry>>,
+    samples: Vec<(SampleKind, TakeSample)>,
     pub fixes: Option<Fixes>,
 }
 
@@ -90,12 +91,25 @@ impl Driver {
         let mut wakeups = Wakeups::new()?;
         let topic = settings.configuration_topic();
         let mut sample_wakeups = Wakeups::new()?;
-        let gyro = settings.gyro_topic.as_deref();
-        let gyro = gyro.map(|it| sample_wakeups.subscribe(&mut node, it, SAMPLES, true));
-        let wheels = settings.wheels_topic.as_deref();
-        let wheels = wheels.map(|it| sample_wakeups.subscribe(&mut node, it, SAMPLES, true));
-        let fixes = settings.fixes.as_ref();
-        let fixes = fixes.map(|config| Fixes::open(&mut node, &mut wakeups, config));
+        let (mut samples, mut fixes) = (Vec::new(), None);
+        for (kind, topic) in &settings.sensors {
+            let of_kind = match kind {
+                SampleKind::Gyro => {
+                    let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
+                    taken(*kind, topic, Imu::sample)
+                }
+                SampleKind::Wheels => {
+                    let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
+                    taken(*kind, topic, Odometry::sample)
+                }
+                SampleKind::Gnss => {
+                    let to = &settings.fixes_to;
+                    fixes = Some(Fixes::open(&mut node, &mut wakeups, topic, to)?);
+                    continue;
+                }
+            };
+            samples.push(of_kind);
+        }
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
@@ -103,9 +117,8 @@ impl Driver {
             configurations: wakeups.subscribe(&mut node, &topic, TURNS, false)?,
             older: wakeups.subscribe(&mut node, &topic, TURNS, false)?,
             azimuths: None,
-            gyro: gyro.transpose()?,
-            wheels: wheels.transpose()?,
-            fixes: fixes.transpose()?,
+            samples,
+            fixes,
             node,
             wakeups,
             sample_wakeups,
@@ -165,25 +178,29 @@ impl Driver {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
 
-    /// Takes the next sample of the gyro or of the wheels. The sample of an unreadable message, or
-    /// one without rates, is not a number, so that it is counted.
+    /// Takes the next sample of a sensor beside the radar.
     pub fn sample(&self, of: SampleKind) -> Option<Sample> {
-        match of {
-            SampleKind::Gyro => match self.gyro.as_ref()?.take() {
-                Ok(taken) => taken.map(|(imu, _)| imu.sample(clock::since_1970_ns())),
-                Err(_) => Some(Sample::yaw_rate(0, f64::NAN)),
-            },
-            SampleKind::Wheels => match self.wheels.as_ref()?.take() {
-                Ok(taken) => taken.map(|(odometry, _)| odometry.sample(clock::since_1970_ns())),
-                Err(_) => Some(Sample::speed(0, f64::NAN)),
-            },
-            SampleKind::Gnss => None,
-        }
+        let (_, take) = self.samples.iter().find(|(kind, _)| *kind == of)?;
+        take()
     }
 
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
         self.azimuths.as_ref().map_or(Ok(None), |take| take())
     }
+}
+
+/// The sample of an unreadable message, or one without rates, is not a number, so that it is
+/// counted.
+fn taken<M: Ros2Message + Send + 'static>(
+    kind: SampleKind,
+    topic: Subscription<M>,
+    sample: fn(&M, i64) -> Sample,
+) -> (SampleKind, TakeSample) {
+    let take = move || match topic.take() {
+        Ok(taken) => taken.map(|(message, _)| sample(&message, clock::since_1970_ns())),
+        Err(_) => Some(Sample::of(kind, 0, [f64::NAN; 6])),
+    };
+    (kind, Box::new(take))
 }
 
 fn packets<M: Ros2Message + Send + 'static>(

@@ -6,15 +6,12 @@ use std::{
 };
 
 use gyre_client::{RunError, clock};
-use gyre_geometry::samples::GnssConfig;
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
 use ros2_client::Subscription;
 
 use super::wakeups::Wakeups;
 use crate::node::Node;
 
-/// The topic of a GNSS receiver, as `nmea_navsat_driver` names it.
-const FIX: &str = "/fix";
 /// Fixes that are kept: ten seconds of 20 a second.
 const FIXES: usize = 200;
 
@@ -31,16 +28,15 @@ impl Fixes {
     pub fn open(
         node: &mut Node,
         wakeups: &mut Wakeups,
-        config: &GnssConfig,
+        topic: &str,
+        listen: &str,
     ) -> Result<Self, RunError> {
         let failed = |error: io::Error| {
-            let listen = &config.listen;
             RunError::Input(format!(
                 "cannot pass the fixes of GNSS on to {listen} (gnss.listen): {error}"
             ))
         };
-        let (socket, listen) = socket_to(&config.listen).map_err(failed)?;
-        let topic = config.topic.as_deref().unwrap_or(FIX);
+        let (socket, listen) = socket_to(listen).map_err(failed)?;
         Ok(Self {
             topic: wakeups.subscribe(node, topic, FIXES, true)?,
             socket,

@@ -1,31 +1,21 @@
 //! The samples of a live gyro and of live wheels: what arrives in datagrams, or comes with the
 //! radar, is handed over with the scan that it belongs to.
 
-use std::{
-    mem,
-    net::UdpSocket,
-    os::fd::{AsFd, BorrowedFd},
-    str::FromStr,
-    time::Duration,
-};
+use std::{mem, os::fd::BorrowedFd, time::Duration};
 
 use gyre_contract::ScanHeader;
 use gyre_geometry::samples::{
-    GyroConfig, GyroKind, LiveSamples, LiveSensor, MAX_SAMPLES, Sample, SampleKind, WheelsConfig,
-    WheelsKind,
+    GyroConfig, LiveSamples, MAX_SAMPLES, Sample, SampleKind, SensorConfig, WheelsConfig,
 };
+use serde::de::DeserializeOwned;
 
 use super::Sensor;
-use crate::{
-    Launch,
-    datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive},
-};
+use crate::{Launch, datagrams::Receiver};
 use gyre_transport::RunError;
 
 /// The live sensors beside a radar.
 pub(super) struct LiveSensors {
     sensors: Vec<Live>,
-    datagram: Vec<u8>,
     of_scan: Vec<Sample>,
     /// The longest time for which a scan waits for its samples.
     pub max_wait: Duration,
@@ -37,36 +27,24 @@ pub(super) struct LiveSensors {
 struct Live {
     kind: SampleKind,
     samples: LiveSamples,
-    socket: Option<UdpSocket>,
-    /// Parses a line of a datagram; `None` for one that is no sample.
-    parse: fn(&str) -> Option<Sample>,
+    /// `None`: the samples come with the radar.
+    receiver: Option<Receiver>,
+    max_wait_ms: f64,
     /// Lines of datagrams that are no samples.
     unreadable: usize,
-    /// Datagrams that the system had dropped at the last scan.
-    dropped: u32,
 }
 
 impl LiveSensors {
-    /// Opens the samples of the sections `[gyro]` and `[wheels]`; `None` without one.
+    /// Opens the samples of the sections of live sensors; `None` without one.
     pub fn open(launch: &Launch) -> Result<Option<Self>, RunError> {
-        let (gyro, wheels): (GyroConfig, WheelsConfig) =
-            (launch.section("gyro")?, launch.section("wheels")?);
-        let (mut sensors, mut max_wait_ms) = (Vec::new(), 0_f64);
-        if gyro.is_live() {
-            max_wait_ms = max_wait_ms.max(gyro.max_wait_ms);
-            let listens = (gyro.kind == GyroKind::Udp).then(|| gyro.listen.clone());
-            let sensor = LiveSensor::Gyro(gyro);
-            sensors.push(Live::open(SampleKind::Gyro, listens, sensor, rates)?);
-        }
-        if wheels.is_live() {
-            max_wait_ms = max_wait_ms.max(wheels.max_wait_ms);
-            let listens = (wheels.kind == WheelsKind::Udp).then(|| wheels.listen.clone());
-            let sensor = LiveSensor::Wheels(wheels);
-            sensors.push(Live::open(SampleKind::Wheels, listens, sensor, speed)?);
-        }
+        let all = [
+            Live::open::<GyroConfig>(launch)?,
+            Live::open::<WheelsConfig>(launch)?,
+        ];
+        let sensors: Vec<Live> = all.into_iter().flatten().collect();
+        let max_wait_ms = sensors.iter().map(|it| it.max_wait_ms).fold(0.0, f64::max);
         Ok((!sensors.is_empty()).then(|| Self {
             sensors,
-            datagram: vec![0; MAX_DATAGRAM],
             of_scan: Vec::new(),
             max_wait: Duration::from_secs_f64(max_wait_ms * 1e-3),
             left_out: 0,
@@ -75,8 +53,8 @@ impl LiveSensors {
     }
 
     pub fn sockets(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
-        let sockets = self.sensors.iter().filter_map(|live| live.socket.as_ref());
-        sockets.map(AsFd::as_fd)
+        let receivers = self.sensors.iter().filter_map(|it| it.receiver.as_ref());
+        receivers.map(Receiver::socket)
     }
 
     /// Takes the samples that have arrived, at most one turn of them.
@@ -84,7 +62,12 @@ impl LiveSensors {
         for live in &mut self.sensors {
             let arrived = (0..MAX_SAMPLES).map_while(|_| radar.sample(live.kind));
             arrived.for_each(|sample| live.samples.add(&sample));
-            live.receive(&mut self.datagram)?;
+            if let Some(receiver) = &mut live.receiver {
+                receiver.receive(|line| match live.kind.parse(line) {
+                    Some(sample) => live.samples.add(&sample),
+                    None => live.unreadable += 1,
+                })?;
+            }
         }
         Ok(())
     }
@@ -101,7 +84,7 @@ impl LiveSensors {
         for live in &mut self.sensors {
             let (samples, of_sensor) = live.samples.of_scan(header.span_ns());
             self.of_scan.extend_from_slice(samples);
-            left_out += of_sensor + mem::take(&mut live.unreadable) + live.newly_dropped();
+            left_out += of_sensor + live.newly_left_out();
         }
         self.of_scan.sort_unstable_by_key(Sample::order);
         header.set_samples(bytes, &self.of_scan, left_out);
@@ -118,114 +101,24 @@ impl LiveSensors {
 }
 
 impl Live {
-    fn open(
-        kind: SampleKind,
-        listens: Option<String>,
-        sensor: LiveSensor,
-        parse: fn(&str) -> Option<Sample>,
-    ) -> Result<Self, RunError> {
-        let section = kind.section();
-        let socket = listens.map(|at| listen(section, section, &at));
-        Ok(Self {
+    /// Opens the sensor of a section; `None` if it is not live.
+    fn open<C: SensorConfig + Default + DeserializeOwned + 'static>(
+        launch: &Launch,
+    ) -> Result<Option<Self>, RunError> {
+        let kind = C::default().of();
+        let config: C = launch.section(kind.section())?;
+        let receiver = config.receives().then(|| Receiver::open(&config));
+        Ok(config.kind().is_live().then_some(Self {
             kind,
-            samples: LiveSamples::new(sensor),
-            socket: socket.transpose()?,
-            parse,
+            receiver: receiver.transpose()?,
+            max_wait_ms: config.max_wait_ms(),
+            samples: LiveSamples::new(Box::new(config)),
             unreadable: 0,
-            dropped: 0,
-        })
+        }))
     }
 
-    fn newly_dropped(&mut self) -> usize {
-        let so_far = self.socket.as_ref().map_or(0, dropped);
-        so_far.wrapping_sub(mem::replace(&mut self.dropped, so_far)) as usize
-    }
-
-    fn receive(&mut self, datagram: &mut [u8]) -> Result<(), RunError> {
-        let Some(socket) = &self.socket else {
-            return Ok(());
-        };
-        let mut left = TURN_BYTES;
-        while let Some(bytes) = receive(socket, datagram, &mut left)? {
-            for line in lines(&datagram[..bytes]) {
-                match (self.parse)(line) {
-                    Some(sample) => self.samples.add(&sample),
-                    None => self.unreadable += 1,
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Parses a sample of a gyro: a stamp, ns, and the rates about x, y and z, rad/s; then, if they are
-/// measured, the accelerations, m/s².
-fn rates(line: &str) -> Option<Sample> {
-    let (stamp_ns, rest) = line.trim().split_once(',')?;
-    let mut sample = Sample::yaw_rate(stamp_ns.trim().parse().ok()?, 0.0);
-    let values: Result<Vec<f64>, _> = rest.split(',').map(|it| f64::from_str(it.trim())).collect();
-    let values = values.ok()?;
-    let is_whole = matches!(values.len(), 3 | 6);
-    sample.values[..values.len().min(6)].copy_from_slice(values.get(..values.len().min(6))?);
-    is_whole.then_some(sample)
-}
-
-/// Parses a sample of the wheels: a stamp, ns, and the speed, m/s.
-fn speed(line: &str) -> Option<Sample> {
-    let (stamp_ns, speed_mps) = line.trim().split_once(',')?;
-    Some(Sample::speed(
-        stamp_ns.trim().parse().ok()?,
-        speed_mps.trim().parse().ok()?,
-    ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_datagram_has_a_sample_in_each_line() {
-        let text = b"1700000000000000001, 0.1,-0.2,0.3\n1700000000000000002,0,0,1e-3,0.5,0,9.8\n";
-        let found: Vec<_> = lines(text).map(rates).collect();
-        let expected = |stamp_ns, values| {
-            Some(Sample {
-                stamp_ns,
-                values,
-                ..Sample::yaw_rate(0, 0.0)
-            })
-        };
-        let [first, second] = [1, 2].map(|ns| 1_700_000_000_000_000_000 + ns);
-        assert_eq!(
-            found,
-            [
-                expected(first, [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]),
-                expected(second, [0.0, 0.0, 1e-3, 0.5, 0.0, 9.8]),
-            ]
-        );
-        let text = b"1700000000000000001, 8.25\n17,-1\n";
-        let found: Vec<_> = lines(text).map(speed).collect();
-        let expected = [Sample::speed(first, 8.25), Sample::speed(17, -1.0)];
-        assert_eq!(found, expected.map(Some));
-    }
-
-    #[test]
-    fn what_is_no_sample_is_told() {
-        for text in [
-            &b"hello"[..],
-            b"1700000000000000001",
-            b"1700000000.5,0,0,0",
-            b"1700000000000000001,0,0",
-            b"1700000000000000001,0,0,0,1",
-            b"1700000000000000001,0,0,0,1,2,3,4",
-            b"1700000000000000001,0,x,0",
-            b"\xff\xfe",
-        ] {
-            let found: Vec<_> = lines(text).map(rates).collect();
-            assert_eq!(found, [None], "{text:?}");
-        }
-        for text in [&b"hello"[..], b"17", b"17,x", b"1.5,3", b"17,3,4", b"\xff"] {
-            let found: Vec<_> = lines(text).map(speed).collect();
-            assert_eq!(found, [None], "{text:?}");
-        }
+    fn newly_left_out(&mut self) -> usize {
+        let dropped = self.receiver.as_mut().map_or(0, Receiver::newly_dropped);
+        dropped + mem::take(&mut self.unreadable)
     }
 }
