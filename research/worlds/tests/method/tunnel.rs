@@ -185,7 +185,7 @@ fn through(motions: &[(OdometryMotion, Pose, Pose, InitialGuess)]) -> Through {
         end_m = off.xy().norm();
         composed = Some(next);
     }
-    let composed = composed.unwrap().motion();
+    let composed = composed.unwrap().motion;
     let slid = |it: &&(OdometryMotion, Pose, Pose, InitialGuess)| it.3 == InitialGuess::AlongWalls;
     Through {
         end_m,
