@@ -19,7 +19,7 @@ use gyre_contract::{
     },
 };
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::samples::{GnssConfig, SensorConfig};
+use gyre_geometry::samples::GnssConfig;
 use gyre_masking::MaskKind;
 use gyre_matching::{
     RefinementKind,
@@ -193,12 +193,6 @@ impl Configuration {
             localises: self.slam.is_localised(),
             objects: self.objects.is_on(),
         }
-    }
-
-    /// The sensors beside the radar.
-    pub fn sensors(&self) -> [&dyn SensorConfig; 3] {
-        let [gyro, wheels] = self.odometry.sensors();
-        [gyro, wheels, &self.gnss]
     }
 
     pub fn is_radar(&self) -> bool {

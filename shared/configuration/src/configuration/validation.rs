@@ -7,7 +7,7 @@ use gyre_contract::{
     StageId,
     run::{Mode, PlayedFault, PlayedFrom, Rate, Side, SourceKind, StageConfig},
 };
-use gyre_geometry::samples::SensorKind;
+use gyre_geometry::samples::{SensorConfig, SensorKind};
 use gyre_ros2_messages::Domain;
 use gyre_simulator::OutputFormat;
 use gyre_slam::SlamKind;
@@ -126,6 +126,12 @@ impl Configuration {
                 "kind is `tracks`, but a run that is split between two machines (link.side) logs no points: set kind to `none`";
         }
         Ok(())
+    }
+
+    /// The sensors beside the radar.
+    pub fn sensors(&self) -> [&dyn SensorConfig; 3] {
+        let [gyro, wheels] = self.odometry.sensors();
+        [gyro, wheels, &self.gnss]
     }
 
     /// A log that is used is named, and no two live sensors have one address.
