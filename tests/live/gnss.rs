@@ -43,8 +43,8 @@ pub fn log_of_drive() -> String {
     lines.map(|line| format!("{line}\n")).collect()
 }
 
-/// Returns what a receiver sends during the drive: one line late, one twice, one that is no fix, and
-/// one without a fix.
+/// Returns what a receiver sends during the drive: one line late, one twice, one that is no fix,
+/// and one without a fix.
 fn lines() -> Vec<String> {
     let mut lines = lines_of(&log_of_drive());
     lines.swap(20, 21);

@@ -81,8 +81,8 @@ fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(
     }
 }
 
-/// Returns the samples that go with the scans of a simulation: of its own sensors, unless other logs
-/// are named.
+/// Returns the samples that go with the scans of a simulation: of its own sensors, unless other
+/// logs are named.
 pub fn simulated_samples(
     drive: &SimulatedDrive,
     sensors: &[&dyn SensorConfig],

@@ -28,7 +28,7 @@ codes! {
         ALONG_WALLS = "along-walls",
     }
 
-    /// What became of the measurement of a sensor beside the radar.
+    /// The verdict on a measurement of a sensor beside the radar.
     pub mod verdict: u64 {
         /// It has not measured the motion.
         NONE = "none",

@@ -16,7 +16,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 pub use crate::stream::Episodes;
-use crate::{config::SimulationConfig, path::Path};
 
 /// Time between two stamps while a host catches up, ns.
 const CATCH_UP_NS: i64 = 100_000;
@@ -28,8 +27,6 @@ pub struct Kind {
     pub header: &'static str,
     /// The value of a sample in each column after the stamp.
     columns: &'static [usize],
-    /// Builds the sensor of a drive along a path; `None` if the drive has no such sensor.
-    device: for<'a> fn(&SimulationConfig, &'a dyn Path) -> Option<Device<'a>>,
 }
 
 pub const KINDS: [Kind; 3] = [
@@ -39,21 +36,18 @@ pub const KINDS: [Kind; 3] = [
         // As in the log of RADIATE.
         header: "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2",
         columns: &[0, 1, 2, 3, 4, 5],
-        device: gyro::device,
     },
     Kind {
         of: SampleKind::Wheels,
         file: "wheels.csv",
         header: "stamp_ns,speed_m_s",
         columns: &[0],
-        device: wheels::device,
     },
     Kind {
         of: SampleKind::Gnss,
         file: "gnss.csv",
         header: "stamp_ns,latitude_deg,longitude_deg,sigma_m",
         columns: &[0, 1, 3],
-        device: gnss::device,
     },
 ];
 
@@ -71,17 +65,6 @@ pub fn samples(
 }
 
 impl Kind {
-    /// The samples during a drive along a path, which starts at a time (ns since 1970) and lasts
-    /// for a duration (s), by their stamps. `None` if the drive has no such sensor.
-    pub(crate) fn records(
-        &self,
-        config: &SimulationConfig,
-        path: &dyn Path,
-        span: (i64, f64),
-    ) -> Option<Vec<Record>> {
-        (self.device)(config, path).map(|device| device.records(span))
-    }
-
     pub fn csv(&self, records: &[Record]) -> String {
         let mut text = format!("{}\n", self.header);
         for (stamp_ns, values) in records {

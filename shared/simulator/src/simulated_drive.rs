@@ -136,8 +136,7 @@ impl SimulatedDrive {
     }
 
     fn records(&self, kind: &Kind) -> Option<Vec<Record>> {
-        let (config, path) = (self.simulator.config(), self.simulator.path());
-        kind.records(config, path, self.simulator.span())
+        self.simulator.records(kind)
     }
 
     pub(crate) fn side_files(&self) -> Vec<(&'static str, String)> {

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use gyre_geometry::{OwnedScan, Pose, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_geometry::{OwnedScan, Pose, ScanLimits, ScanSlot, SweepGeometry, samples::SampleKind};
 use nalgebra::Point2;
 
 use crate::{
+    beside::{Kind, Record, gnss, gyro, wheels},
     cars::Cars,
     config::{MAX_SCANS, Realism, SimulationConfig},
     error::SimulatorError,
@@ -109,6 +110,18 @@ impl Simulator {
     pub(crate) fn span(&self) -> (i64, f64) {
         let end_s = self.scans as f64 * self.sampling.period_us as f64 * 1e-6;
         (EPOCH_US * 1000, end_s)
+    }
+
+    /// The samples of a sensor beside the radar, by their stamps. `None` if the drive has no such
+    /// sensor.
+    pub(crate) fn records(&self, kind: &Kind) -> Option<Vec<Record>> {
+        let (config, seed, path) = (&self.config, self.config.seed, self.path());
+        let device = match kind.of {
+            SampleKind::Gyro => gyro::device(&config.gyro, seed, path),
+            SampleKind::Wheels => wheels::device(&config.wheels, seed, path),
+            SampleKind::Gnss => gnss::device(&config.gnss, seed, path),
+        };
+        Some(device?.records(self.span()))
     }
 
     pub fn sensor(&self) -> Sensor {

@@ -98,8 +98,8 @@ impl Configuration {
     }
 
     /// There are points where they are needed, and fixes are constraints of a graph. The fixes of a
-    /// recording are in a log. Those beside a live radar arrive during the run, or are in a log that
-    /// is complete when it begins.
+    /// recording are in a log. Those beside a live radar arrive during the run, or are in a log
+    /// that is complete when it begins.
     fn validate_method(&self) -> Result<(), ConfigurationError> {
         let (odometry, slam, gnss) = (&self.odometry, &self.slam, &self.gnss);
         let has_points = odometry.points.capacity > 0;

@@ -9,7 +9,6 @@ mod inspect;
 mod plain_words;
 mod sample_log;
 mod scan_samples;
-mod table;
 
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, Format,

@@ -1,5 +1,5 @@
-//! The log of a sensor beside the radar, as a file or in a bag: one reader for all kinds of sensors,
-//! which the table in [`kinds`] tells apart.
+//! The log of a sensor beside the radar, as a file or in a bag: one reader for all kinds of
+//! sensors, which the table in [`kinds`] tells apart.
 
 mod columns;
 mod counts;
@@ -10,6 +10,7 @@ pub(crate) mod jumps;
 pub(crate) mod kinds;
 mod rates;
 mod received;
+mod table;
 
 use std::path::{Path, PathBuf};
 
@@ -27,9 +28,9 @@ use crate::{
     Format,
     dataset::{frame_stamps, is_folder_of_images},
     parse_seconds,
-    table::{MAX_BYTES, Raw, Rows, leave_out},
 };
 use kinds::Kind;
+use table::{MAX_BYTES, Raw, Rows, leave_out};
 
 /// The largest file of `GPS_IMU_Twist`: they have about 900 bytes.
 const MAX_TWIST_BYTES: u64 = 1 << 16;

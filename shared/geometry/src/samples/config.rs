@@ -63,8 +63,8 @@ pub enum SensorKind {
     /// None: by the radar alone.
     #[default]
     None,
-    /// The samples that come with the scans, else the log that lies beside them; without either it is
-    /// an error.
+    /// The samples that come with the scans, else the log that lies beside them; without either it
+    /// is an error.
     Auto,
     /// The log that `file` names.
     Log,
@@ -102,8 +102,8 @@ pub trait SensorConfig {
     /// The address for receiving datagrams.
     fn listen(&self) -> &str;
 
-    /// Returns whether a run receives datagrams at that address. The source passes fixes of ROS 2 on
-    /// to there.
+    /// Returns whether a run receives datagrams at that address. The source passes fixes of ROS 2
+    /// on to there.
     fn receives(&self) -> bool {
         self.kind() == SensorKind::Udp || self.of() == SampleKind::Gnss && self.kind().is_live()
     }
@@ -128,8 +128,8 @@ pub trait SensorConfig {
         None
     }
 
-    /// Takes a sample over to the radar's clock and the vehicle's axes. `up` is the axis that points
-    /// up where none is configured.
+    /// Takes a sample over to the radar's clock and the vehicle's axes. `up` is the axis that
+    /// points up where none is configured.
     fn on_radar(&self, sample: &Sample, up: Option<UpAxis>) -> Sample;
 }
 

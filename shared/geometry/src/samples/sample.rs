@@ -41,7 +41,7 @@ pub enum SampleKind {
     Gnss = 3,
 }
 
-/// What is known of a kind of samples.
+/// The properties of a kind of samples.
 struct Row {
     section: &'static str,
     /// The numbers of values that a line of a datagram can have; none of a kind whose lines can be

@@ -3,7 +3,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{Device, Drift, normal};
 use crate::{
-    config::SimulationConfig,
     path::Path,
     stream::{Episodes, Stream},
 };
@@ -32,13 +31,13 @@ pub struct SimulatedGnssConfig {
     pub faults: bool,
 }
 
-pub(super) fn device<'a>(config: &SimulationConfig, path: &'a dyn Path) -> Option<Device<'a>> {
-    let (rate_hz, seed) = (config.gnss.rate_hz, config.seed);
-    let [every_s, lasts_s] = if config.gnss.faults {
-        HOLES_S
-    } else {
-        [0.0; 2]
-    };
+pub(crate) fn device<'a>(
+    config: &SimulatedGnssConfig,
+    seed: u64,
+    path: &'a dyn Path,
+) -> Option<Device<'a>> {
+    let rate_hz = config.rate_hz;
+    let [every_s, lasts_s] = if config.faults { HOLES_S } else { [0.0; 2] };
     let plane = LocalPlane::new(ORIGIN, 0.0);
     let mut errors = Stream::GNSS_ERRORS.generator(seed);
     let bias_m = normal(&mut errors) * BIAS_M;

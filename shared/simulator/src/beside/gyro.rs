@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{Device, Drift, Measure, normal, rounded};
 use crate::{
-    config::SimulationConfig,
     path::Path,
     stream::{Episodes, Stream},
 };
@@ -127,8 +126,11 @@ const EXACT: GyroFigures = GyroFigures {
     step_radps: 0.0,
 };
 
-pub(super) fn device<'a>(config: &SimulationConfig, path: &'a dyn Path) -> Option<Device<'a>> {
-    let (gyro, seed) = (&config.gyro, config.seed);
+pub(crate) fn device<'a>(
+    gyro: &SimulatedGyroConfig,
+    seed: u64,
+    path: &'a dyn Path,
+) -> Option<Device<'a>> {
     let figures = gyro.profile.figures()?;
     let [every_s, lasts_s, lost] = if gyro.faults { FAULTS } else { [0.0; 3] };
     let mut errors = Stream::GYRO_ERRORS.generator(seed);

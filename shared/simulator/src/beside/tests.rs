@@ -10,10 +10,9 @@ const RATE_HZ: f64 = 100.0;
 
 /// The drive of a configuration, and the records of all kinds.
 fn simulated(settings: &str) -> (Simulator, [Option<Vec<Record>>; 3]) {
-    let config: SimulationConfig = toml::from_str(settings).unwrap();
+    let config: crate::SimulationConfig = toml::from_str(settings).unwrap();
     let simulator = Simulator::new(&config).unwrap();
-    let of = |kind: Kind| kind.records(&config, simulator.path(), simulator.span());
-    let records = KINDS.map(of);
+    let records = KINDS.map(|kind| simulator.records(&kind));
     (simulator, records)
 }
 

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{Device, Measure, normal, rounded};
 use crate::{
-    config::SimulationConfig,
     path::Path,
     stream::{Episodes, Stream},
 };
@@ -47,8 +46,11 @@ const CAR: WheelFigures = WheelFigures {
     slip_share: 0.3,
 };
 
-pub(super) fn device<'a>(config: &SimulationConfig, path: &'a dyn Path) -> Option<Device<'a>> {
-    let (wheels, seed) = (&config.wheels, config.seed);
+pub(crate) fn device<'a>(
+    wheels: &SimulatedWheelsConfig,
+    seed: u64,
+    path: &'a dyn Path,
+) -> Option<Device<'a>> {
     let [every_s, lasts_s, lost] = if wheels.faults { FAULTS } else { [0.0; 3] };
     let mut errors = Stream::WHEEL_ERRORS.generator(seed);
     let measure = CAR.measure(&mut errors, |time_s| path.pose(time_s));

@@ -3,7 +3,7 @@
 use gyre_geometry::samples::{LocalPlane, Sample};
 
 use super::LogFaults;
-use crate::table::{between, leave_out, longest_chain};
+use super::table::{between, leave_out, longest_chain};
 
 /// No vehicle that carries a spinning radar is faster, m/s.
 const MAX_SPEED_MPS: f64 = 70.0;

@@ -5,8 +5,8 @@ use std::ops::Range;
 use gyre_geometry::samples::Sample;
 use gyre_radar::median;
 
+use super::table::{between, leave_out, longest_chain};
 use super::{LogFaults, LogGap, kinds::Kind};
-use crate::table::{between, leave_out, longest_chain};
 
 /// If the share of absurd rates is larger, the unit must be different.
 pub(crate) const ABSURD_SHARE: f64 = 0.01;

@@ -5,8 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::table::{Raw, Rows};
 use super::{Form, LogError, SampleLog, kinds::Kind};
-use crate::table::{Raw, Rows};
 use gyre_geometry::samples::SampleKind;
 
 const OF: SampleKind = SampleKind::Gnss;

@@ -33,7 +33,8 @@ fn imu(number: i64) -> Imu {
     }
 }
 
-/// Four turns of a radar, with 30 messages on each of these topics, by the types that their names imply.
+/// Four turns of a radar, with 30 messages on each of these topics, by the types that their names
+/// imply.
 fn with(topics: &[&str]) -> Messages {
     with_changed(topics, |_, _| {})
 }

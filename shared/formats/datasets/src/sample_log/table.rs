@@ -7,10 +7,8 @@ use csv::StringRecord;
 use gyre_geometry::samples::Sample;
 use gyre_storage::quoted;
 
-use crate::{
-    header::Header,
-    sample_log::{Columns, kinds::Kind},
-};
+use super::{Columns, kinds::Kind};
+use crate::header::Header;
 
 /// The largest file: a day of samples at 200 Hz has 2 GB.
 pub(crate) const MAX_BYTES: u64 = 4 << 30;
