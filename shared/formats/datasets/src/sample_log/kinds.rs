@@ -20,7 +20,7 @@ pub(crate) struct Kind {
     pub name: &'static str,
     /// A measurement, in the plural.
     pub samples: &'static str,
-    /// The advice to use a log that was found: the begin of a sentence.
+    /// The advice to use a log that was found: the beginning of a sentence.
     pub uses: &'static str,
     /// Logs relative to the root of a dataset, in order of precedence.
     pub places: &'static [&'static str],
