@@ -132,6 +132,10 @@ fn the_numbers_of_each_log_are_those_of_the_samples_which_more_scans_extend() {
         }
         assert!(kind.csv(&more.unwrap()).starts_with(&text), "{}", kind.file);
     }
+    // Each value is in the column that the first row names: the altitude of a fix is in none.
+    let record = (7, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let row = |kind: Kind| kind.csv(&[record]).lines().nth(1).unwrap().to_owned();
+    assert_eq!(KINDS.map(row), ["7,1,2,3,4,5,6", "7,1", "7,1,2,4"]);
 }
 
 #[test]
