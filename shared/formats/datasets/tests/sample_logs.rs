@@ -201,6 +201,7 @@ fn what_is_no_log_is_refused_with_the_reason_or_the_remedy() {
         "wheels|stamp_ns,speed_m_s|it has no samples",
         "wheels|stamp_ns,speed_m_s,reverse|1,9.0,1|have a direction",
         "wheels|stamp_ns,ticks,direction|1,9,back|have a direction",
+        "wheels|stamp_ns,left_ticks,right_count|1,9,9|have no speed",
         "gnss|1,2,3|3 columns have no names",
         "gnss|stamp_ns,x,y|have no positions",
         "gnss|latitude,longitude|have no stamps",

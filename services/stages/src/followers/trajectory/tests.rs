@@ -186,3 +186,22 @@ fn fixes_correct_as_keyframes_come_and_the_last_correction_is_that_of_the_result
     assert!((turned_rad - 0.06).abs() < 0.02, "{turned_rad}");
     logs.end_and_compare(&mut trajectory);
 }
+
+#[test]
+fn an_idle_step_takes_the_fixes_that_have_arrived() {
+    let logs = Logs::new();
+    let mut trajectory = logs.trajectory();
+    // The system gives such a port to no socket.
+    let listen = format!("127.0.0.3:{}", 20_000 + std::process::id() % 10_000);
+    let config = GnssConfig {
+        listen: listen.clone(),
+        ..GnssConfig::default()
+    };
+    let live = LiveFixes::open(config, logs.out.path()).unwrap();
+    trajectory.live_fixes = Some(live);
+    let receiver = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    receiver.send_to(b"1,2,3", &listen).unwrap();
+    follow(&mut trajectory);
+    let log = std::fs::read_to_string(received_fixes(logs.out.path())).unwrap();
+    assert!(log.ends_with("\n1,2,3,0\n"), "{log}");
+}

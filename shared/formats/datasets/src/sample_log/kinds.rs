@@ -313,14 +313,20 @@ fn speed(header: &Header) -> Result<Columns, String> {
 /// Names of the ticks of one wheel, or of an axle.
 const TICKS: &str = "ticks pulses wheel_ticks encoder_ticks";
 /// Names of the ticks of two wheels of an axle; their mean is used.
-const LEFT: &str = "left_ticks ticks_left left_count";
-const RIGHT: &str = "right_ticks ticks_right right_count";
+const LEFT_AND_RIGHT: [[&str; 2]; 3] = [
+    ["left_ticks", "right_ticks"],
+    ["ticks_left", "ticks_right"],
+    ["left_count", "right_count"],
+];
 const METRES: &str = "distance_m odometer_m mileage_m";
 
 /// The columns of an encoder or an odometer, which counts ticks or metres since some time.
 fn counts(header: &Header) -> Option<Columns> {
     let one = |names: &str| header.find(names).map(|column| [column; 2]);
-    let both = || Some([header.find(LEFT)?, header.find(RIGHT)?]);
+    let both = || {
+        let mut pairs = LEFT_AND_RIGHT.iter();
+        pairs.find_map(|[left, right]| Some([header.find(left)?, header.find(right)?]))
+    };
     let metres = one(METRES);
     let counts = metres.or_else(both).or_else(|| one(TICKS))?;
     let has_direction = header.find(DIRECTIONS).is_some();
