@@ -43,8 +43,8 @@ pub fn log_of_drive() -> String {
     lines.map(|line| format!("{line}\n")).collect()
 }
 
-/// Returns what a receiver sends during the drive: one line late, one twice, one that is no fix,
-/// and one without a fix.
+/// Returns the lines of a receiver during the drive: one line comes late, one twice, one is no
+/// line of a receiver, and one has no fix.
 fn lines() -> Vec<String> {
     let mut lines = lines_of(&log_of_drive());
     lines.swap(20, 21);

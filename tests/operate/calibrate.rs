@@ -26,7 +26,7 @@ fn calibrate(recording: &Path, out: &Path, set: &[&str], words: &[&str]) -> Ende
     Ended::of(command)
 }
 
-/// Reads a drive with too long ranges; returns what is printed, and the right offset.
+/// Reads a drive with too long ranges; returns the output, and the right offset.
 fn wrongly_read(out: &Path, words: &[&str]) -> (String, f64) {
     let recording = recording::around_a_block();
     let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());

@@ -125,7 +125,7 @@ fn the_sensors_clock_goes_on_while_its_source_is_dead() {
     let summary: Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["restarts"]["radar-replay"], 1);
     assert!(number(&figures["faults"][0]["recovery_ms"]) > 0.0);
-    // 6 s of 4 scans/s: also those of the time without a source.
+    // 6 s of 4 scans/s, with the time without a source.
     assert_eq!(figures["counts"]["due"], 24);
     stress.assert_nothing_left("kills");
 }

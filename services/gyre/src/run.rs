@@ -16,7 +16,7 @@ use gyre_configuration::{
 };
 use gyre_contract::run::{Ending, Report};
 use gyre_datasets::SampleLog;
-use gyre_geometry::samples::GnssKind;
+use gyre_geometry::samples::SensorKind;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_storage as storage;
@@ -359,8 +359,8 @@ fn keep_fixes(configuration: &Configuration, out: &Out) {
     let received = received_fixes(out.path());
     let rows: Result<_, Failure> = match gnss.kind {
         _ if !record.is_on() => return,
-        GnssKind::Auto => copied_fixes(gnss, &configuration.source.data).map_err(Failure::from),
-        GnssKind::Udp | GnssKind::Ros2 if received.exists() => {
+        SensorKind::Auto => copied_fixes(gnss, &configuration.source.data).map_err(Failure::from),
+        SensorKind::Udp | SensorKind::Ros2 if received.exists() => {
             storage::read_text(&received, u64::from(u32::MAX)).map_err(Failure::from)
         }
         _ => return,

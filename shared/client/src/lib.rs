@@ -18,7 +18,7 @@
 //! | attach to a run by the folder of its results, or to the only one | [`Run::open`], [`Run::only`] |
 //! | read a topic, typed | [`Run::observe`] |
 //! | read a topic by its name | [`gyre_contract::topic`], [`Run::observe_topic`] |
-//! | read the journal of its poses | [`RecordReader`] of [`PoseHeader`](gyre_contract::PoseHeader) |
+//! | read its journal | [`RecordReader`] of [`PoseHeader`](gyre_contract::PoseHeader) |
 //! | wait for several topics | [`Observer::next`], [`wait_for_any`] |
 //! | restart, swap or end | [`control::Control`] |
 //! | measure the processes | [`UsedRun`] |

@@ -38,7 +38,7 @@ codes! {
         /// Wheels slip.
         REFUSED = "refused",
         /// It differs by more than noise from the registered motion, but not by more than a match
-        /// can err: both are weighed all the same.
+        /// can err: the motion has the part of the sensor, and the next match decides.
         DOUBTED = "doubted",
     }
 }
@@ -104,7 +104,7 @@ impl WitnessRecord {
         [verdict::USED, verdict::DOUBTED].contains(&self.verdict)
     }
 
-    /// Returns what it measured; `None` if it has not measured the motion.
+    /// Returns the measurement; `None` if the sensor has not measured the motion.
     pub fn measured(&self) -> Option<f64> {
         (self.verdict != verdict::NONE).then_some(self.measured)
     }

@@ -84,7 +84,7 @@ topics! {
             }
         }
     }
-    /// Counts of the data that a live radar has delivered and of what was lost, with each scan.
+    /// Counts of delivered and lost data of a live radar, with each scan.
     Intake = "intake" {
         IntakeHeader, FloatBlock, by Sender::Stage(&[StageId::RadarReplay]), for [], Latest,
         is [Recorded Linked Replaces]

@@ -1,4 +1,4 @@
-//! The table of the kinds of sensors beside the radar: how outputs name each, and what it measures.
+//! The kinds of sensors beside the radar: the measured part of a motion, and the names in outputs.
 
 use gyre_geometry::samples::SampleKind;
 

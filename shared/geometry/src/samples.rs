@@ -18,10 +18,7 @@ mod sample;
 mod wheels;
 mod wheels_config;
 
-pub use config::{
-    GyroConfig, SensorConfig, SensorKind, SensorKind as GnssKind, SensorKind as GyroKind,
-    SensorKind as WheelsKind, UpAxis,
-};
+pub use config::{GyroConfig, SensorConfig, SensorKind, UpAxis};
 pub use doppler::{DopplerConfig, DopplerDisplacement, DopplerKind, DopplerVelocity};
 pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{GnssConfig, GnssFix};

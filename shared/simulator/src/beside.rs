@@ -90,7 +90,7 @@ pub struct Device<'a> {
     /// The part of the period of a sample that is over at its stamp.
     pub stamped_at: f64,
     pub errors: ChaCha8Rng,
-    /// The random numbers of the host. `None`: the host draws from those of the errors.
+    /// The random numbers of the host. `None`: the host draws from `errors`.
     pub host: Option<ChaCha8Rng>,
     pub clock: Clock<'a>,
     /// Share of the samples that the host loses. `None`: the host never draws.
@@ -132,8 +132,8 @@ pub struct Drift<const N: usize> {
 }
 
 impl<const N: usize> Drift<N> {
-    /// An error with a standard deviation after a long time, of which a third remains after
-    /// `lasts_s`.
+    /// An error with the standard deviation `sigma` after a long time. A third of an error remains
+    /// after `lasts_s`.
     pub fn new(sigma: f64, lasts_s: f64, rate_hz: f64, value: SVector<f64, N>) -> Self {
         let kept = (-1.0 / (rate_hz * lasts_s)).exp();
         Self {

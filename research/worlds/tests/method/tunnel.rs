@@ -4,7 +4,7 @@
 use std::{fmt::Write as _, path::Path};
 
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
-use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw, samples::{DopplerKind, GyroKind, SampleKind, WheelsKind}, OwnedScan};
+use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw, samples::{DopplerKind, SampleKind, SensorKind}, OwnedScan};
 use gyre_matching::{odometry::{Odometry, OdometryConfig}, InitialGuess};
 use gyre_worlds::{GyroProfile, OutputFormat, Profile, SimulatedDrive, SimulationConfig, TunnelConfig, drive::DriveConfig};
 use nalgebra::Vector3;
@@ -84,13 +84,13 @@ fn with(
     }
     let (mut samples, path) = (ScanSamples::None, Path::new("simulation"));
     if gyro {
-        config.gyro.kind = GyroKind::Auto;
+        config.gyro.kind = SensorKind::Auto;
         let gyro = drive.samples(SampleKind::Gyro).unwrap().into();
         let log = SampleLog::of(SampleKind::Gyro, gyro, path).unwrap();
         samples = ScanSamples::of_log(&log, &config.gyro, dataset).unwrap();
     }
     if wheels {
-        config.wheels.kind = WheelsKind::Auto;
+        config.wheels.kind = SensorKind::Auto;
         let wheels = drive.samples(SampleKind::Wheels).unwrap().into();
         let log = SampleLog::of(SampleKind::Wheels, wheels, path).unwrap();
         samples = samples.and(ScanSamples::of_log(&log, &config.wheels, dataset).unwrap());

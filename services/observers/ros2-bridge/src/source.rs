@@ -30,7 +30,7 @@ pub struct Settings {
     pub topic: String,
     /// The topics of the sensors beside the radar that are in ROS 2.
     pub sensors: Vec<(SampleKind, String)>,
-    /// The address to which fixes are passed on.
+    /// The address that receives the fixes.
     pub fixes_to: String,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,

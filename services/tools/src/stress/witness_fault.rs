@@ -44,8 +44,7 @@ pub fn needed_s(faults: &[PlayedFault]) -> f64 {
     faults.last().map_or(0.0, |last| last.ends_s() + AFTER_S)
 }
 
-/// Returns the sensors that a fault concerns, of which a run needs one, and what a run without them
-/// lacks.
+/// Returns the sensors that a fault concerns and their name in a sentence. A run needs one of them.
 fn concerned(kind: PlayedFaultKind) -> (&'static [Witness], &'static str) {
     match kind {
         PlayedFaultKind::GyroOut => (&[Witness::Gyro], "a gyro, and gyro.kind is none"),

@@ -35,8 +35,9 @@ pub(crate) use detect::is_folder_of_images;
 pub use encoder::{EncoderTurn, FIRST_TURNS, correct_eccentricity, encoder_counts};
 pub use error::{OpenError, ReadError};
 pub use format::Format;
-pub use images::{ImageSize, ImageSource};
+pub use images::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption, stored_options};
+pub use png_image::ImageSize;
 pub use radiate::frame_stamps;
 pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns, turn_ns};
 

@@ -1,5 +1,5 @@
-//! The log of a sensor beside the radar, as a file or in a bag: one reader for all kinds of
-//! sensors, which the table in [`kinds`] tells apart.
+//! The log of a sensor beside the radar, as a file or in a bag: one reader for the kinds
+//! of sensors in [`kinds`].
 
 mod columns;
 mod counts;
@@ -8,9 +8,11 @@ mod faults;
 mod fixes;
 pub(crate) mod jumps;
 pub(crate) mod kinds;
+mod names;
 mod rates;
 mod received;
 mod table;
+mod words;
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,8 @@
 //! Messages as viewers draw them, in Foxglove's schemas: see [`CHANNELS`].
 //!
-//! Motions are in the frame of the scan before, poses and objects in that of the first scan, loops
-//! in that of the earlier keyframe, fixes in the map of the earlier drive. `/points` is not
-//! recorded: the wire message has them. `/correction` is later than the poses, so it is on a
+//! Motions are in the frame of the scan before, poses and objects in the frame of the first scan,
+//! loops in the frame of the earlier keyframe, fixes in the map of the earlier drive. `/points` is
+//! not recorded: the wire message has them. `/correction` is later than the poses, so it is on a
 //! channel of its own beside `/tf`, which is in order.
 
 use std::collections::VecDeque;

@@ -96,7 +96,7 @@ pub trait SensorConfig {
 
     fn topic(&self) -> Option<&str>;
 
-    /// The topic of a live sensor: if none is configured, the usual one.
+    /// The topic of a live sensor: the configured topic, or the usual one.
     fn live_topic(&self) -> &str;
 
     /// The address for receiving datagrams.
@@ -129,7 +129,7 @@ pub trait SensorConfig {
     }
 
     /// Takes a sample over to the radar's clock and the vehicle's axes. `up` is the axis that
-    /// points up where none is configured.
+    /// points up if the configuration names no axis.
     fn on_radar(&self, sample: &Sample, up: Option<UpAxis>) -> Sample;
 }
 

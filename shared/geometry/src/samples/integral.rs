@@ -203,7 +203,7 @@ mod tests {
         rates
     }
 
-    /// The samples of these rates, and between them those of all other kinds.
+    /// The samples of these rates, with samples of all other kinds between them.
     fn samples(of: SampleKind, rates: &[Rate]) -> Vec<Sample> {
         let sample = |(ns, rate): &Rate| {
             SampleKind::OF_SCANS.map(|kind| {

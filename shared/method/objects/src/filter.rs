@@ -1,6 +1,6 @@
 //! The filter of a track: interacting multiple models (Blom and Bar-Shalom, "The interacting
-//! multiple model algorithm for systems with Markovian switching coefficients", 1988), each a
-//! Kalman filter of position and velocity that turns at a rate of its own, in which the motion is
+//! multiple model algorithm for systems with Markovian switching coefficients", 1988). Each model
+//! is a Kalman filter of position and velocity with a turn rate of its own, so that the motion is
 //! linear (Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and
 //! Navigation", 2001, Sec. 11.7.1).
 

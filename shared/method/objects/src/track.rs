@@ -28,7 +28,7 @@ const EVEN_LIKELY: f64 = 0.35;
 const CONFIRM_SCORE: f64 = 1.0;
 /// The largest score, so that an object that has gone ends soon.
 const MAX_SCORE: f64 = 4.0;
-/// The score from which on an object that a scan shows is reported.
+/// The least score of a reported object that a scan shows.
 const KEEP_SCORE: f64 = 0.0;
 const END_SCORE: f64 = -2.0;
 const MISSED_LOSS: f64 = 1.0;

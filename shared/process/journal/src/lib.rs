@@ -65,8 +65,8 @@ pub fn poses_from(
 }
 
 impl Journal {
-    /// Opens or creates the journal of the run that writes to `out`, and cuts off what a death or a
-    /// power failure has left of its last records. Only the end is read, however long it is.
+    /// Opens or creates the journal of the run that writes to `out`, and cuts off last records that
+    /// a death or a power failure has left incomplete. Only the end is read, however long it is.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         let mut log = RecordLog::open(out)?;
         log.reserve(size_of::<PoseHeader>());

@@ -30,7 +30,7 @@ pub(crate) struct Receiver {
 }
 
 impl Receiver {
-    /// Receives what is sent to the address of a live sensor.
+    /// Opens the address of a live sensor.
     pub fn open(sensor: &dyn SensorConfig) -> Result<Self, RunError> {
         let (section, address) = (sensor.of().section(), sensor.listen());
         let bound = UdpSocket::bind(address);

@@ -21,7 +21,7 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 use crate::{StagePlan, SuperviseError, end::ends_within, log::Log, run::Run, start::Starter};
 
-/// The time in which restarts are counted against the limit of a stage.
+/// A stage may restart as often in this time as its limit allows.
 const RESTART_WINDOW: Duration = Duration::from_secs(30);
 /// Delay before the restart of a process that exited. A killed one is restarted at once.
 pub const RESTART_BACKOFF: Duration = Duration::from_millis(100);
@@ -121,8 +121,8 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    /// Goes back to the program before, or to `begun`, that of the run's begin, if a file of the
-    /// one before has changed.
+    /// Goes back to the previous program, or to `begun`, the first program of the run, if a file of
+    /// the previous program has changed.
     pub fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();

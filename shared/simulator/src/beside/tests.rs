@@ -174,7 +174,7 @@ fn with_faults_hosts_stall_wheels_slip_receivers_are_in_holes_and_samples_are_lo
     let stalled = faulty[0].iter().filter(|it| !is_on_time(it.0)).count();
     assert!((250..400).contains(&stalled), "{stalled}");
     assert!(faulty[0].is_sorted_by(|a, b| a.0 < b.0));
-    // What is measured in a stall comes at its end, at once.
+    // The samples of a stall come at the end of the stall, all at once.
     let pauses_s = faulty[0].windows(3).filter_map(|it| {
         let [pause_s, next_s] = [it[1].0 - it[0].0, it[2].0 - it[1].0];
         (next_s < 2e-4 && pause_s > 2e-4).then_some(pause_s)

@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeSet,
-    fmt,
     ops::RangeInclusive,
     path::{Path, PathBuf},
 };
@@ -13,32 +12,13 @@ use super::{
     error::{OpenError, ReadError},
     format::Format,
     image_list::{self, file_number},
-    png_image::{self, ImageReader},
+    png_image::{self, ImageReader, ImageSize},
     stamp,
 };
 
 const FIRST_TRIES: usize = 8;
 /// Number of images, spread over all of them, whose sizes are looked at.
 const SIZES: usize = 32;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct ImageSize {
-    pub width: usize,
-    pub height: usize,
-}
-
-impl ImageSize {
-    /// Bytes of the image: one per pixel.
-    pub fn bytes(self) -> usize {
-        self.width * self.height
-    }
-}
-
-impl fmt::Display for ImageSize {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} columns x {} rows", self.width, self.height)
-    }
-}
 
 /// A generator of a recording's images on request. [`open_source`](super::open_source) reads them
 /// like images on disk.

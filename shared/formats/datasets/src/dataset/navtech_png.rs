@@ -5,7 +5,7 @@ use std::{f64::consts::TAU, path::Path};
 
 use gyre_geometry::scan::{check_sweep, flag};
 
-use super::{error::ReadError, images::ImageSize, stamp};
+use super::{error::ReadError, png_image::ImageSize, stamp};
 
 pub(crate) const METADATA_BYTES: usize = 11;
 /// Minimum share of consecutive rows that differ in byte 10 if it is the direction of the chirp.

@@ -15,9 +15,10 @@ use super::{
     error::{OpenError, ReadError},
     first_image::{FirstImage, NamedBy, turn_of},
     format::Format,
-    images::{ImageSize, Images},
+    images::Images,
     navtech_png::{self, ByteTen, METADATA_BYTES},
     options::{AzimuthSource, DatasetOptions},
+    png_image::ImageSize,
     profiles::{Profile, ScanTime},
     row_order, stamp,
 };

@@ -75,13 +75,13 @@ pub struct DatasetOptions {
     /// encoder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_source: Option<AzimuthSource>,
-    /// Encoder counts per turn. Default: 5600, or what the radar of a bag says; where the first
-    /// scans show another number, that one.
+    /// Encoder counts per turn. Default: the number that the first scans show; else the number in
+    /// a bag, or 5600.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_counts: Option<u16>,
-    /// Azimuths that the host has lost, which images without metadata (RADIATE, MulRan as recorded)
-    /// do not say: the columns behind them have moved up, and the last columns are of the scan
-    /// before. Default: `find`.
+    /// Azimuths that the host has lost, in images without metadata (RADIATE, MulRan as recorded):
+    /// the columns behind them have moved up, and the last columns are of the scan before. Default:
+    /// `find`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost_azimuths: Option<LostAzimuthOption>,
     /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's

@@ -1,11 +1,11 @@
 //! Grey PNG images, decoded into the caller's memory.
 
+use std::fmt;
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::error::ReadError;
-use super::images::ImageSize;
 
 /// Maximum size of an image, bytes: 1024 azimuths of 32,768 range bins and their metadata.
 const MAX_IMAGE_BYTES: u64 = 1024 * (32_768 + 11);
@@ -14,6 +14,25 @@ const HEADER_BYTES: usize = 29;
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
 /// Memory limit of the decoder beside the image: rows, tables, text chunks.
 const DECODER_BYTES: usize = 4 << 20;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct ImageSize {
+    pub width: usize,
+    pub height: usize,
+}
+
+impl ImageSize {
+    /// Bytes of the image: one per pixel.
+    pub fn bytes(self) -> usize {
+        self.width * self.height
+    }
+}
+
+impl fmt::Display for ImageSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} columns x {} rows", self.width, self.height)
+    }
+}
 
 pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
     let mut header = Vec::with_capacity(HEADER_BYTES);

@@ -282,7 +282,8 @@ pub fn search_until(inside: usize, drive: &Drive) -> impl FnMut(usize) -> Pose {
     }
 }
 
-/// The scans to which these motions lead, of motions from scan 0 on.
+/// The numbers of the scans behind the motions for which `is_one` holds; the first motion leads to
+/// scan 1.
 pub fn scans_where(refined: &[Refined], is_one: impl Fn(&Refined) -> bool) -> Vec<usize> {
     let ones = (1..).zip(refined).filter(|(_, it)| is_one(it));
     ones.map(|(k, _)| k).collect()
@@ -345,7 +346,7 @@ pub fn refine_on(
         .collect()
 }
 
-/// Refines the motions to each scan but the first, with what aids each and what its search finds.
+/// Refines the motions to each scan but the first, with the aiding and the searched motion of each.
 pub fn refine_aided(
     refiner: &mut Refiner,
     scans: &[Vec<SparsePoint>],

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
 use gyre_geometry::{
     OwnedScan, Pose, SparsePoint,
-    samples::{Gyro, GyroKind, Sample, SampleKind, Wheels, WheelsKind},
+    samples::{Gyro, Sample, SampleKind, SensorKind, Wheels},
     xy_yaw,
 };
 use gyre_matching::{
@@ -68,7 +68,7 @@ impl Drive {
             }
         };
         let scans = (0..scans).map(registered).collect();
-        (config.gyro.kind, config.wheels.kind) = (GyroKind::Auto, WheelsKind::Auto);
+        (config.gyro.kind, config.wheels.kind) = (SensorKind::Auto, SensorKind::Auto);
         Self {
             scans,
             dataset,
@@ -196,7 +196,8 @@ const KINDS: [&str; 7] = [
 
 const SWEEP: [usize; 2] = [26, 13];
 
-/// Draws a number of samples of a gyro (0) or of wheels (1): those of a sweep or more, or less.
+/// Draws a number of samples of a gyro (0) or of wheels (1): a sweep of samples or more, or
+/// fewer samples.
 fn length(is_long: bool, sensor: usize, seed: u64, numbers: &mut Numbers) -> usize {
     let sweep = SWEEP[sensor];
     match (is_long, seed / 14 % 3) {

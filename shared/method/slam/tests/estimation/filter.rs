@@ -1,5 +1,5 @@
-//! The trajectory filter on wrong loops, groups and limits. Its estimates are compared with those
-//! of the graph in `graph.rs`.
+//! The trajectory filter on wrong loops, groups and limits. `graph.rs` compares its
+//! estimates with the estimates of the graph.
 
 use super::common::{Drive, ODOMETRY, exact};
 use gyre_geometry::{Pose, UncertainMotion, pose, xy_yaw};
