@@ -60,7 +60,7 @@ pub fn new(what: &New) -> Result<ExitCode, Failure> {
     }
     let folder = folder.display();
     print::line(format_args!(
-        "{folder} is begun: {folder}/README.md says how it is tried"
+        "{folder} has been written: {folder}/README.md lists its commands"
     ))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -102,5 +102,36 @@ fn checkout(folder: &Path) -> Result<PathBuf, Failure> {
     match folder.canonicalize() {
         Ok(folder) if is_one => Ok(folder),
         _ => Err(format!("{} is no checkout of Gyre", folder.display()).into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// The manifest of a project has the crates that its program names, and no others of Gyre.
+    #[test]
+    fn a_project_in_rust_depends_on_the_crates_that_the_templates_name() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let manifest = template!("rust/Cargo.toml.txt");
+        let programs = [
+            template!("rust/masking.rs"),
+            template!("rust/rotation-search.rs"),
+            template!("rust/translation-search.rs"),
+        ];
+        let mut dependencies = Vec::new();
+        for line in manifest.lines().filter(|line| line.starts_with("gyre-")) {
+            let (name, path) = line.split_once(" = { path = \"@gyre@/").unwrap();
+            let path = root.join(path.trim_end_matches("\" }")).join("Cargo.toml");
+            assert!(path.is_file(), "{}", path.display());
+            dependencies.push(name.replace('-', "_"));
+        }
+        let programs = programs.concat();
+        let parts = programs.split(|c: char| !c.is_ascii_lowercase() && c != '_');
+        let named: BTreeSet<&str> = parts.filter(|it| it.starts_with("gyre_")).collect();
+        dependencies.sort();
+        assert!(named.iter().eq(&dependencies), "{named:?} {dependencies:?}");
     }
 }
