@@ -1,9 +1,8 @@
 //! The record of a refinement in the messages that carry a motion.
 
-use crate::{
-    wire::{Bounds, codes, wire},
-    witness::{Measures, Witness},
-};
+use gyre_geometry::samples::{Measures, Witness};
+
+use crate::wire::{Bounds, codes, wire};
 
 codes! {
     pub mod outcome: u32 {

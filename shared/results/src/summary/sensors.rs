@@ -195,7 +195,7 @@ pub fn problem(
         let is_wrong = match kind.row().measures {
             Measures::Turn => {
                 too_many(contradictions, it.motions, MAX_DOUBTED_SHARE)
-                    || !config.gyro.allows_scale(it.last.scale)
+                    || (it.last.scale - 1.0).abs() > config.gyro.max_scale_error()
             }
             Measures::Distance => too_many(contradictions, it.motions, MAX_SLIPPING_SHARE),
         };
