@@ -247,6 +247,9 @@ impl Refiner {
         let mut covariance = registered.covariance;
         let (near_rad, drift_share) = (scan.step.turn.map(|it| it.yaw_rad()), self.drift_share());
         let seen = self.seen(Witness::Gyro, registered, near_rad.unwrap_or_default());
+        if scan.step.turn.is_none() {
+            covariance[(2, 2)] += self.jump_rad2(scan, &registered.motion);
+        }
         let Some(filter) = &mut self.state.filters[GYRO] else {
             return covariance;
         };
@@ -261,6 +264,19 @@ impl Refiner {
         }
         covariance[(2, 2)] += filter.reset_to(&seen);
         covariance
+    }
+
+    /// Returns the square of a jump of the heading that no sensor has measured, rad², zero of a turn
+    /// that a single match can err by: the whole scan can be turned, as by a slip of the encoder,
+    /// and the next match then takes the jump back.
+    fn jump_rad2(&self, scan: &Scan<'_>, pose: &Pose) -> f64 {
+        let is_predicted = self.state.anchors[0].is_some_and(|anchor| anchor.age_s == 0.0);
+        let [predicted, _] = self.state.predict(&scan.step);
+        let jump_rad = predicted.rotation.rotation_to(&pose.rotation).angle();
+        match is_predicted && jump_rad.abs() > JITTER_DEG.to_radians() {
+            true => jump_rad.powi(2),
+            false => 0.0,
+        }
     }
 
     /// Returns whether a registered pose contradicts the predicted distance.
