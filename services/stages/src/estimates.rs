@@ -102,5 +102,7 @@ fn witness(witnessed: Option<Witnessed>) -> WitnessRecord {
         scale_sigma: of.scale_sigma,
         bias: of.bias,
         bias_sigma: of.bias_sigma,
+        delay_s: of.delay_s,
+        delay_sigma_s: of.delay_sigma_s,
     }
 }

@@ -44,7 +44,7 @@ codes! {
 
 wire! {
     /// A sensor beside the radar in a motion; all zero if it has not measured the motion.
-    pub struct WitnessRecord = "gyre_witness_record_v1" {
+    pub struct WitnessRecord = "gyre_witness_record_v2" {
         /// See [`verdict`].
         pub verdict: u64 [Bounds::Codes(verdict::NAMES)],
         /// The turn (rad) or the distance (m) since the previous scan that it measured, or the
@@ -56,10 +56,13 @@ wire! {
         /// Bias after the scan, rad/s; the offset of an absolute heading, rad; zero of a distance.
         pub bias: f64 [Bounds::Finite],
         pub bias_sigma: f64 [Bounds::Finite],
+        /// Delay of its stamps beyond the configured one, s.
+        pub delay_s: f64 [Bounds::Finite],
+        pub delay_sigma_s: f64 [Bounds::Finite],
     }
 
     /// The result of a refinement; all zero without one.
-    pub struct RefinementRecord = "gyre_refinement_v7" {
+    pub struct RefinementRecord = "gyre_refinement_v8" {
         /// See [`outcome`].
         pub outcome: u32 [Bounds::Codes(outcome::NAMES)],
         /// The initial guess of the accepted motion: see [`initial_guess`].

@@ -95,6 +95,9 @@ pub struct Witnessed {
     /// Bias, rad/s; the offset of an absolute heading, rad; zero of a distance.
     pub bias: f64,
     pub bias_sigma: f64,
+    /// Delay of its stamps beyond the configured one, s.
+    pub delay_s: f64,
+    pub delay_sigma_s: f64,
 }
 
 struct Accepted {
