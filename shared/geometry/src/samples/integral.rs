@@ -209,7 +209,7 @@ mod tests {
     /// The samples of these rates, with samples of all other kinds between them.
     fn samples(of: SampleKind, rates: &[Rate]) -> Vec<Sample> {
         let sample = |(ns, rate): &Rate| {
-            SampleKind::OF_SCANS.map(|kind| {
+            SampleKind::ALL.map(|kind| {
                 let value = if kind == of { *rate } else { 9.0 };
                 Sample::of(kind, *ns, [value; 6])
             })

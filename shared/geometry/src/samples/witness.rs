@@ -1,6 +1,7 @@
-//! The kinds of sensors beside the radar: the measured part of a motion, and the names in outputs.
+//! The kinds of sensors beside the radar, and of their samples: the measured part of a motion, and
+//! the names in outputs.
 
-use crate::samples::SampleKind;
+use crate::samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample};
 
 crate::named! {
     /// A kind of sensor beside the radar, with its name in configurations and outputs. Of two that
@@ -85,5 +86,75 @@ impl Witness {
         Self::ALL
             .into_iter()
             .filter_map(|kind| Some((kind, kind.row().samples?)))
+    }
+}
+
+/// The quantity that a sample measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum SampleKind {
+    /// Angular velocity about x, y, z (rad/s), then acceleration along them (m/s²).
+    Gyro = 1,
+    /// Speed along x (m/s), negative backwards.
+    Wheels = 2,
+    /// Place of the antenna: latitude and longitude (degrees), or east and north (m); altitude
+    /// above the ellipsoid (m), 0 where the log has none; standard deviation along each of both
+    /// axes (m), not above zero where the log has none; 1 if the receiver does not state whether it
+    /// had a fix. Fixes travel with no scan.
+    Gnss = 3,
+}
+
+/// The properties of a kind of samples.
+struct SampleRow {
+    section: &'static str,
+    /// The numbers of values that a line of a datagram can have; none of a kind whose lines can be
+    /// without a measurement.
+    counts: &'static [usize],
+    /// The values at the front that are bounded, and their bound; `None`: it travels with no scan.
+    bounded: Option<(usize, f64)>,
+    /// The value that is integrated from scan to scan.
+    rate: usize,
+}
+
+impl SampleKind {
+    pub const ALL: [Self; 3] = [Self::Gyro, Self::Wheels, Self::Gnss];
+
+    const fn row(self) -> SampleRow {
+        let (section, counts, bounded, rate): (_, &[usize], _, _) = match self {
+            Self::Gyro => ("gyro", &[3, 6], Some((3, MAX_RATE_RADPS)), 2),
+            Self::Wheels => ("wheels", &[1], Some((1, MAX_SPEED_MPS)), 0),
+            Self::Gnss => ("gnss", &[], None, 0),
+        };
+        SampleRow {
+            section,
+            counts,
+            bounded,
+            rate,
+        }
+    }
+
+    pub const fn section(self) -> &'static str {
+        self.row().section
+    }
+
+    pub(super) const fn rate(self) -> usize {
+        self.row().rate
+    }
+
+    pub(super) const fn bounded(self) -> Option<(usize, f64)> {
+        self.row().bounded
+    }
+
+    /// Parses a line of a datagram: a stamp, ns, and the values in their order, with commas
+    /// between. `None`: it is no sample.
+    pub fn parse(self, line: &str) -> Option<Sample> {
+        let (stamp_ns, rest) = line.split_once(',')?;
+        let parsed: Result<Vec<f64>, _> = rest.split(',').map(|it| it.trim().parse()).collect();
+        let parsed = parsed
+            .ok()
+            .filter(|it| self.row().counts.contains(&it.len()))?;
+        let mut values = [0.0; 6];
+        values[..parsed.len()].copy_from_slice(&parsed);
+        Some(Sample::of(self, stamp_ns.trim().parse().ok()?, values))
     }
 }
