@@ -21,6 +21,8 @@ pub enum Measures {
     Turn,
     /// The distance ahead, m.
     Distance,
+    /// The heading itself, rad, with an unknown constant offset.
+    Heading,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +79,7 @@ static TABLE: [Row; Witness::ALL.len()] = [
 ];
 
 impl Witness {
-    pub fn row(self) -> &'static Row {
+    pub const fn row(self) -> &'static Row {
         &TABLE[self as usize]
     }
 

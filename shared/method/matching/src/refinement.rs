@@ -87,12 +87,12 @@ pub struct Refined {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Witnessed {
     pub verdict: Verdict,
-    /// The turn (rad) or the distance (m) that it measured.
+    /// The turn (rad), the distance (m) or the heading (rad) that it measured.
     pub measured: f64,
     /// True value over the measured one.
     pub scale: f64,
     pub scale_sigma: f64,
-    /// Bias, rad/s; zero of a sensor of the distance.
+    /// Bias, rad/s; the offset of an absolute heading, rad; zero of a distance.
     pub bias: f64,
     pub bias_sigma: f64,
 }
@@ -189,6 +189,7 @@ impl Refiner {
         let (map, state, config) = (&self.map, &self.state, &self.config);
         let uncertainty = Uncertainty::before(&scan, map, state, predictions, config);
         let accepted = self.accept_or_predict(&scan, &mut best, &uncertainty);
+        self.observe_headings(&scan, &accepted.pose.motion);
         let witnesses = self.witnessed(&scan);
         let report = self.report(&scan, &accepted);
         self.update(&scan, &best, &accepted);

@@ -249,6 +249,34 @@ fn a_chain_may_start_with_any_scan_number() {
     assert!(off.translation.vector.norm() < 0.2 && refiner.state().pose != Pose::identity());
 }
 
+/// A scan that is turned as a whole by an angle that a vehicle can turn, as by a slip of the
+/// encoder: the covariances of the motions to it and from it have the jump.
+#[test]
+fn a_scan_that_is_turned_as_a_whole_widens_the_covariance() {
+    let (drive, mut scans) = bend();
+    let sigmas = |scans: &[Vec<SparsePoint>]| -> Vec<f64> {
+        let refined = refine(&drive, scans).refined;
+        refined
+            .iter()
+            .map(|it| it.motion.covariance[(2, 2)].sqrt())
+            .collect()
+    };
+    let before = sigmas(&scans);
+    let jump_rad = 6.6_f64.to_radians();
+    let (sin, cos) = (jump_rad as f32).sin_cos();
+    for point in &mut scans[30] {
+        let [x, y] = [point.x_m, point.y_m];
+        (point.x_m, point.y_m) = (cos * x - sin * y, sin * x + cos * y);
+    }
+    let after = sigmas(&scans);
+    assert!(before.iter().all(|sigma| *sigma < 0.02), "{before:?}");
+    assert!(
+        after[29..31].iter().all(|sigma| *sigma > 0.7 * jump_rad),
+        "{after:?}"
+    );
+    assert!(after[33..].iter().all(|sigma| *sigma < 0.02), "{after:?}");
+}
+
 #[test]
 fn the_variance_of_a_predicted_pose_grows_with_the_square_of_the_predictions() {
     let drive = Drive::steady(10.0, 0.0, 14);

@@ -1,6 +1,7 @@
 //! One coordinate of the vehicle by another sensor and the radar together: an error-state Kalman
-//! filter (Solà 2017, 5 to 7) over the coordinate, the drift of the radar, and the bias and the
-//! scale of the sensor. The coordinate is the heading, or the place along the path.
+//! filter (Solà 2017, 5 to 7) over the coordinate, the drift of the radar, the bias and the scale of
+//! the sensor, and the offset of an absolute heading. The coordinate is the heading, or the place
+//! along the path.
 //!
 //! The radar measures it in the local map. A registration errs by white jitter, which the next
 //! registration takes back, so that the errors of successive motions are correlated; and the map
@@ -10,8 +11,9 @@
 use gyre_geometry::{
     Pose,
     samples::{Evidence, GyroConfig, SensorConfigs, Witness},
+    wrap_angle,
 };
-use nalgebra::{Matrix4, RowVector4, Vector4};
+use nalgebra::{Matrix5, RowVector5, Vector5};
 use serde::{Deserialize, Serialize};
 
 use super::Witnessed;
@@ -28,14 +30,21 @@ const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
 /// Least standard deviation of such a scale around 1: the settings may be for other tyres.
 const TYRES: f64 = 0.02;
+/// Standard deviation of the offset of an absolute heading, rad: any angle.
+const OFFSET_RAD: f64 = 2.0;
+/// Random walk of that offset, rad/√s: errors of a receiver or a compass that last.
+const OFFSET_WALK_RAD_PER_SQRT_S: f64 = 3e-5;
 
 /// The states, in the order of the covariance.
 const VALUE: usize = 0;
 const DRIFT: usize = 1;
 const BIAS: usize = 2;
 const SCALE: usize = 3;
+const OFFSET: usize = 4;
 /// The part that each has in a registered coordinate.
-const SEEN: RowVector4<f64> = RowVector4::new(1.0, 1.0, 0.0, 0.0);
+const SEEN: RowVector5<f64> = RowVector5::new(1.0, 1.0, 0.0, 0.0, 0.0);
+/// The part that each has in a measured absolute heading.
+const OBSERVED: RowVector5<f64> = RowVector5::new(1.0, 0.0, 0.0, 0.0, 1.0);
 
 /// The coordinate, the drift of the map in it, and the bias and the scale of the sensor: rad for
 /// the heading, m along the path.
@@ -49,9 +58,13 @@ pub struct Filter {
     pub bias: f64,
     /// True change over the measured change, but for the bias.
     pub scale: f64,
-    /// Covariance of the errors of coordinate, drift, bias and scale.
-    pub covariance: Matrix4<f64>,
+    /// Measured absolute heading minus the heading, rad.
+    pub offset_rad: f64,
+    /// Covariance of the errors of coordinate, drift, bias, scale and offset.
+    pub covariance: Matrix5<f64>,
     pub verdict: Verdict,
+    /// The verdict on the absolute heading.
+    pub offset_verdict: Verdict,
     /// Correction and jitter at the last reported pose.
     pub reported: [f64; 2],
 }
@@ -127,7 +140,7 @@ pub(super) struct Predicted {
     bias_variance: f64,
     scale_variance: f64,
     /// The covariance of the filter at the scan, if the coordinate is the predicted one.
-    covariance: Matrix4<f64>,
+    covariance: Matrix5<f64>,
 }
 
 impl Predicted {
@@ -172,11 +185,11 @@ pub(super) struct Seen {
 
 impl Filter {
     pub(super) fn new(errors: &SharedErrors) -> Self {
-        let [bias, scale] = [errors.bias_sigma, errors.scale_sigma].map(|it| it * it);
+        let sigmas = Vector5::new(0.0, 0.0, errors.bias_sigma, errors.scale_sigma, OFFSET_RAD);
         Self {
             bias: errors.bias,
             scale: 1.0,
-            covariance: Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, bias, scale)),
+            covariance: Matrix5::from_diagonal(&sigmas.component_mul(&sigmas)),
             ..Self::default()
         }
     }
@@ -193,10 +206,14 @@ impl Filter {
         }
     }
 
-    /// Propagates bias and scale over a time.
+    /// Propagates bias, scale and offset over a time.
     pub(super) fn wait(&mut self, time_s: f64, errors: &SharedErrors) {
-        let walks = [errors.bias_walk_per_sqrt_s, errors.scale_walk_per_sqrt_s];
-        for (state, walk) in [BIAS, SCALE].into_iter().zip(walks) {
+        let walks = [
+            (BIAS, errors.bias_walk_per_sqrt_s),
+            (SCALE, errors.scale_walk_per_sqrt_s),
+            (OFFSET, OFFSET_WALK_RAD_PER_SQRT_S),
+        ];
+        for (state, walk) in walks {
             self.covariance[(state, state)] += walk.powi(2) * time_s;
         }
     }
@@ -205,7 +222,7 @@ impl Filter {
     pub(super) fn predict(&self, measured: &Evidence, errors: &SharedErrors) -> Predicted {
         let (time_s, value) = (measured.interval_s, measured.value[0]);
         let noise = measured.covariance[0] + errors.noise_per_sqrt_s.powi(2) * time_s;
-        let mut step = Matrix4::identity();
+        let mut step = Matrix5::identity();
         (step[(VALUE, BIAS)], step[(VALUE, SCALE)]) = (-time_s, value);
         let mut covariance = step * self.covariance * step.transpose();
         covariance[(VALUE, VALUE)] += noise;
@@ -261,18 +278,53 @@ impl Filter {
             return apart.powi(2);
         }
         let variance_before = self.covariance[(VALUE, VALUE)];
-        let across = self.covariance * SEEN.transpose();
-        let gain = across / ((SEEN * across)[0] + seen.jitter);
+        self.correct_by(apart, &SEEN, seen.jitter);
+        variance_before - self.covariance[(VALUE, VALUE)]
+    }
+
+    /// The update of the Kalman filter by a measurement that is `apart` from its prediction, of
+    /// which the states have these parts.
+    fn correct_by(&mut self, apart: f64, parts: &RowVector5<f64>, variance: f64) {
+        let across = self.covariance * parts.transpose();
+        let gain = across / ((parts * across)[0] + variance);
         let step = gain * apart;
         self.correction += step[VALUE];
         self.drift += step[DRIFT];
         self.bias += step[BIAS];
         self.scale += step[SCALE];
+        self.offset_rad += step[OFFSET];
         // Joseph's form stays symmetric and positive.
-        let kept = Matrix4::identity() - gain * SEEN;
+        let kept = Matrix5::identity() - gain * parts;
         self.covariance =
-            kept * self.covariance * kept.transpose() + gain * gain.transpose() * seen.jitter;
-        variance_before - self.covariance[(VALUE, VALUE)]
+            kept * self.covariance * kept.transpose() + gain * gain.transpose() * variance;
+    }
+
+    /// Weighs a measured absolute heading against the heading of the tracker's pose, both in rad,
+    /// unless both disagree.
+    pub(super) fn observe(&mut self, measured: &Evidence, tracker_rad: f64) {
+        let predicted_rad = tracker_rad + self.correction + self.offset_rad;
+        let apart_rad = wrap_angle(measured.value[0] - predicted_rad);
+        let variance = (OBSERVED * self.covariance * OBSERVED.transpose())[0];
+        let noise = measured.covariance[0];
+        self.offset_verdict = match apart_rad.powi(2) <= GATE * (variance + noise) {
+            true => Verdict::Agrees,
+            false => Verdict::Refused,
+        };
+        if self.offset_verdict == Verdict::Agrees {
+            self.correct_by(apart_rad, &OBSERVED, noise);
+        }
+    }
+
+    /// Returns the verdict on an absolute heading, with the offset as its bias.
+    pub(super) fn witnessed_heading(&self, measured_rad: f64) -> Witnessed {
+        Witnessed {
+            verdict: self.offset_verdict,
+            measured: measured_rad,
+            scale: 1.0,
+            scale_sigma: 0.0,
+            bias: self.offset_rad,
+            bias_sigma: self.covariance[(OFFSET, OFFSET)].max(0.0).sqrt(),
+        }
     }
 
     /// Takes a registered coordinate. A sensor that disagrees with a certain match is refused. If all
@@ -325,7 +377,7 @@ impl Filter {
 
     /// Makes the error of one state that of another with the other sign.
     fn tie(&mut self, state: usize, to: usize) {
-        let mut step = Matrix4::identity();
+        let mut step = Matrix5::identity();
         (step[(state, state)], step[(state, to)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
     }
@@ -377,9 +429,12 @@ impl Filter {
         }
     }
 
-    /// A new chain of motions starts with a new map.
+    /// A new chain of motions starts with a new map, at a heading of its own.
     pub(super) fn start_chain(&mut self) {
         self.reported = [self.correction, 0.0];
+        self.covariance.row_mut(OFFSET).fill(0.0);
+        self.covariance.column_mut(OFFSET).fill(0.0);
+        self.covariance[(OFFSET, OFFSET)] = OFFSET_RAD.powi(2);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The other sensors in a motion: their predictions, and their comparison with the radar's matches.
 
 use gyre_geometry::{
-    UncertainMotion,
+    Pose, UncertainMotion,
     samples::{AllEvidence, Evidence, Measures, Witness},
     wrap_angle,
 };
@@ -11,7 +11,7 @@ use super::{
     Filter, Refiner, SinceMatch, Witnessed,
     candidates::{Candidate, Scan},
     config::JITTER_DEG,
-    filter::{Predicted, Seen, Verdict},
+    filter::{Seen, Verdict},
     predicted::{PredictedDistance, PredictedTurn, seen_distance},
     tracker::Step,
 };
@@ -22,9 +22,17 @@ const DRIFT_RAD_PER_SQRT_M: f64 = 5.2e-5;
 const GYRO: usize = Witness::Gyro as usize;
 const DOPPLER: usize = Witness::Doppler as usize;
 
-/// The measurements about a motion, each with the prediction by it. The measurement by Doppler is
+/// The measurements about a motion, in the order of [`Witness::ALL`]. The measurement by Doppler is
 /// the displacement.
-pub(super) type Predictions = [Option<(Evidence, Predicted)>; Witness::ALL.len()];
+pub(super) type Measured = [Option<Evidence>; Witness::ALL.len()];
+
+/// The filter of a kind: an absolute heading belongs to the filter of the heading.
+const fn filter_of(kind: Witness) -> usize {
+    match kind.row().measures {
+        Measures::Turn | Measures::Heading => GYRO,
+        Measures::Distance => kind as usize,
+    }
+}
 
 /// The kinds that measure the distance. Of these the first that is not refused predicts it.
 fn distances() -> impl Iterator<Item = Witness> {
@@ -38,44 +46,45 @@ impl Refiner {
     pub(super) fn predict(&mut self, evidence: [&AllEvidence; 2], interval_s: f64) -> Step {
         self.state.since_match.place_s += interval_s;
         let measured = self.measured(evidence, interval_s);
-        let predict = |k: usize| {
-            let (filter, errors) = (&mut self.state.filters[k], &self.errors[k]);
-            if measured[k].is_some() {
-                filter.get_or_insert(Filter::new(errors));
-            }
-            let filter = filter.as_mut()?;
-            filter.wait(interval_s, errors);
-            Some((measured[k]?, filter.predict(&measured[k]?, errors)))
-        };
-        let predictions: Predictions = std::array::from_fn(predict);
+        for kind in Witness::ALL
+            .into_iter()
+            .filter(|kind| measured[*kind as usize].is_some())
+        {
+            let k = filter_of(kind);
+            self.state.filters[k].get_or_insert(Filter::new(&self.errors[k]));
+        }
+        for (filter, errors) in self.state.filters.iter_mut().zip(&self.errors) {
+            filter.iter_mut().for_each(|it| it.wait(interval_s, errors));
+        }
         let filters = &self.state.filters;
-        let turn = predictions[GYRO]
-            .zip(filters[GYRO])
-            .map(|((turn, predicted), filter)| {
-                PredictedTurn::new(predicted, filter.scale * turn.value[1] - filter.bias)
-            });
+        let predicted = std::array::from_fn(|k| {
+            let (measured, errors) = (measured[k].as_ref()?, &self.errors[k]);
+            Some(filters[k]?.predict(measured, errors))
+        });
+        let predict_turn = || {
+            let (predicted, filter, turn) = (predicted[GYRO]?, filters[GYRO]?, measured[GYRO]?);
+            let sweep_rate_radps = filter.scale * turn.value[1] - filter.bias;
+            Some(PredictedTurn::new(predicted, sweep_rate_radps))
+        };
         let predict_distance = |kind: Witness| {
-            let (measured, predicted) = predictions[kind as usize]?;
+            let (measured, predicted) = (measured[kind as usize]?, &predicted[kind as usize]?);
             let filter = filters[kind as usize].filter(|it| it.verdict != Verdict::Refused)?;
             let side = [filter.scale * measured.value[1], measured.covariance[2]];
             let (ahead_m, since) = (self.radar_ahead_m(kind), &self.state.since_match);
             Some(PredictedDistance::new(
-                kind, &predicted, side, ahead_m, since,
+                kind, predicted, side, ahead_m, since,
             ))
         };
         Step {
             interval_s,
-            turn,
+            turn: predict_turn(),
             distance: distances().find_map(predict_distance),
-            predictions,
+            measured,
+            predicted,
         }
     }
 
-    fn measured(
-        &self,
-        [earlier, later]: [&AllEvidence; 2],
-        interval_s: f64,
-    ) -> [Option<Evidence>; Witness::ALL.len()] {
+    fn measured(&self, [earlier, later]: [&AllEvidence; 2], interval_s: f64) -> Measured {
         let config = &self.sensors.doppler;
         let velocities = earlier[DOPPLER].measured().zip(later[DOPPLER].measured());
         let mut measured = later.map(|it| it.measured().copied());
@@ -89,15 +98,31 @@ impl Refiner {
     fn radar_ahead_m(&self, kind: Witness) -> f64 {
         match kind {
             Witness::Wheels => self.sensors.wheels.radar_ahead_m,
-            Witness::Gyro | Witness::Doppler => 0.0,
+            _ => 0.0,
         }
     }
 
     pub(super) fn witnessed(&self, scan: &Scan<'_>) -> [Option<Witnessed>; Witness::ALL.len()] {
-        std::array::from_fn(|k| {
-            let (measured, _) = scan.step.predictions[k]?;
-            Some(self.state.filters[k]?.witnessed(measured.value[0]))
+        Witness::ALL.map(|kind| {
+            let measured = scan.step.measured[kind as usize]?;
+            let filter = self.state.filters[filter_of(kind)]?;
+            Some(match kind.row().measures {
+                Measures::Heading => filter.witnessed_heading(measured.value[0]),
+                Measures::Turn | Measures::Distance => filter.witnessed(measured.value[0]),
+            })
         })
+    }
+
+    /// Weighs absolute headings against the heading of the filter at a pose of the tracker.
+    pub(super) fn observe_headings(&mut self, scan: &Scan<'_>, pose: &Pose) {
+        for kind in Witness::ALL {
+            let measured = &scan.step.measured[kind as usize];
+            if let (Measures::Heading, Some(measured), Some(filter)) =
+                (kind.row().measures, measured, self.state.heading_mut())
+            {
+                filter.observe(measured, pose.rotation.angle());
+            }
+        }
     }
 
     /// Returns the best match of a scan. A certain match that contradicts the gyro is the match
@@ -185,7 +210,7 @@ impl Refiner {
     fn gate_turn(&self, scan: &Scan<'_>, best: &Candidate) -> Verdict {
         let registered = self.registered(scan, &best.alignment);
         let verdict = registered.and_then(|registered| {
-            let (_, turn) = scan.step.predictions[GYRO]?;
+            let turn = scan.step.predicted[GYRO]?;
             let seen = self.seen(Witness::Gyro, &registered, turn.in_map);
             Some(self.state.filters[GYRO]?.gate(&seen, &turn, JITTER_DEG.to_radians()))
         });
@@ -222,6 +247,9 @@ impl Refiner {
         let mut covariance = registered.covariance;
         let (near_rad, drift_share) = (scan.step.turn.map(|it| it.yaw_rad()), self.drift_share());
         let seen = self.seen(Witness::Gyro, registered, near_rad.unwrap_or_default());
+        if scan.step.turn.is_none() {
+            covariance[(2, 2)] += self.jump_rad2(scan, &registered.motion);
+        }
         let Some(filter) = &mut self.state.filters[GYRO] else {
             return covariance;
         };
@@ -238,6 +266,19 @@ impl Refiner {
         covariance
     }
 
+    /// Returns the square of a jump of the heading that no sensor has measured, rad², zero of a turn
+    /// that a single match can err by: the whole scan can be turned, as by a slip of the encoder,
+    /// and the next match then takes the jump back.
+    fn jump_rad2(&self, scan: &Scan<'_>, pose: &Pose) -> f64 {
+        let is_predicted = self.state.anchors[0].is_some_and(|anchor| anchor.age_s == 0.0);
+        let [predicted, _] = self.state.predict(&scan.step);
+        let jump_rad = predicted.rotation.rotation_to(&pose.rotation).angle();
+        match is_predicted && jump_rad.abs() > JITTER_DEG.to_radians() {
+            true => jump_rad.powi(2),
+            false => 0.0,
+        }
+    }
+
     /// Returns whether a registered pose contradicts the predicted distance.
     pub(super) fn contradicts_distance(
         &self,
@@ -251,8 +292,8 @@ impl Refiner {
     /// Returns whether a sensor has measured a distance that agrees with a registered pose.
     fn agrees(&self, kind: Witness, scan: &Scan<'_>, registered: &UncertainMotion) -> bool {
         let seen = self.seen(kind, registered, 0.0);
-        let both = scan.step.predictions[kind as usize].zip(self.state.filters[kind as usize]);
-        both.is_some_and(|((_, predicted), filter)| {
+        let both = scan.step.predicted[kind as usize].zip(self.state.filters[kind as usize]);
+        both.is_some_and(|(predicted, filter)| {
             filter.gate(&seen, &predicted, 0.0) == Verdict::Agrees
         })
     }
@@ -270,7 +311,7 @@ impl Refiner {
         }
         for kind in distances() {
             let seen = self.seen(kind, registered, 0.0);
-            let predicted = scan.step.predictions[kind as usize].map(|(_, it)| it);
+            let predicted = scan.step.predicted[kind as usize];
             let errors = &self.errors[kind as usize];
             if let Some(filter) = &mut self.state.filters[kind as usize] {
                 filter.judge(&seen, predicted.as_ref(), is_certain, errors);
@@ -286,8 +327,8 @@ impl Refiner {
     pub(super) fn follow_distances(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
         for kind in distances() {
             let agrees = self.agrees(kind, scan, registered);
-            let predicted = scan.step.predictions[kind as usize];
-            let Some((filter, (_, predicted))) =
+            let predicted = scan.step.predicted[kind as usize];
+            let Some((filter, predicted)) =
                 self.state.filters[kind as usize].as_mut().zip(predicted)
             else {
                 continue;
@@ -318,9 +359,9 @@ impl Refiner {
         }
         let by = scan.step.distance.map(|it| it.by);
         for kind in distances() {
-            let predicted = scan.step.predictions[kind as usize];
+            let predicted = scan.step.predicted[kind as usize];
             match (&mut self.state.filters[kind as usize], predicted) {
-                (Some(filter), Some((_, predicted))) if by == Some(kind) => {
+                (Some(filter), Some(predicted)) if by == Some(kind) => {
                     filter.take_prediction(predicted.in_map, &predicted);
                 }
                 (Some(filter), _) => filter.inflate(motion.covariance[(0, 0)]),
@@ -334,7 +375,7 @@ impl Refiner {
     /// The distance that predicts a scan's, as measured; zero without one.
     fn driven_m(&self, scan: &Scan<'_>) -> f64 {
         let by = scan.step.distance.map(|it| it.by as usize);
-        let measured = by.and_then(|kind| scan.step.predictions[kind]);
-        measured.map_or(0.0, |(measured, _)| measured.value[0])
+        let measured = by.and_then(|kind| scan.step.measured[kind]);
+        measured.map_or(0.0, |measured| measured.value[0])
     }
 }

@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::{
     Filter, Outcome, RefinementConfig, SinceMatch, Standstill,
     config::{JITTER_DEG, JITTER_M},
+    filter::Predicted,
     predicted::{PredictedDistance, PredictedTurn},
-    sensors::Predictions,
+    sensors::Measured,
 };
 
 /// Weight of the newest velocity, which jitters with each match, in its running mean.
@@ -50,7 +51,8 @@ pub(super) struct Step {
     pub turn: Option<PredictedTurn>,
     /// The distance since then, by wheels that do not slip, or by Doppler.
     pub distance: Option<PredictedDistance>,
-    pub predictions: Predictions,
+    pub measured: Measured,
+    pub predicted: [Option<Predicted>; Witness::ALL.len()],
 }
 
 impl Step {
@@ -285,7 +287,8 @@ mod tests {
         interval_s: 0.25,
         turn: None,
         distance: None,
-        predictions: [None; Witness::ALL.len()],
+        measured: [None; Witness::ALL.len()],
+        predicted: [None; Witness::ALL.len()],
     };
 
     fn after(poses: &[(f64, f64)]) -> TrackerState {

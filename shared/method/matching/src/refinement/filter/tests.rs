@@ -219,6 +219,53 @@ fn the_variances_are_true_through_gaps_of_the_log() {
     }
 }
 
+/// A drive with an absolute heading beside the gyro, with white noise and a constant offset.
+#[test]
+fn an_absolute_heading_bounds_the_error_of_the_heading() {
+    const NOISE_RAD: f64 = 0.009;
+    let (mut nees, mut with, mut without) = (0.0, 0.0, 0.0);
+    for seed in 0..200 {
+        let [mut drive, mut alone] = [(); 2].map(|()| Drive::new(gyro(), seed));
+        let offset_rad = 3.0 - 0.03 * seed as f64;
+        for event in events(seed).into_iter().cycle().take(1200) {
+            let change = drive.normal(0.1);
+            drive.step(event, change);
+            let heading = drive.truth + offset_rad + drive.normal(NOISE_RAD);
+            let measured = Evidence {
+                value: [wrap_angle(heading), 0.0],
+                covariance: [NOISE_RAD.powi(2), 0.0, 0.0],
+                ..Evidence::default()
+            };
+            drive.filter.observe(&measured, drive.at);
+            let change = alone.normal(0.1);
+            alone.step(event, change);
+        }
+        let off = |drive: &Drive| drive.truth - drive.at - drive.filter.correction;
+        nees += drive.nees()[0] / 200.0;
+        with += off(&drive).powi(2) / 200.0;
+        without += off(&alone).powi(2) / 200.0;
+    }
+    assert!((0.6..1.5).contains(&nees), "{nees}");
+    assert!(with < 0.1 * without, "{with} {without}");
+}
+
+#[test]
+fn a_heading_that_turns_the_other_way_is_refused() {
+    let mut drive = Drive::new(gyro(), 1);
+    let mut refused = 0;
+    for _ in 0..200 {
+        drive.step(Event::Fused, 0.03);
+        let measured = Evidence {
+            value: [wrap_angle(-drive.truth), 0.0],
+            covariance: [1e-4, 0.0, 0.0],
+            ..Evidence::default()
+        };
+        drive.filter.observe(&measured, drive.at);
+        refused += usize::from(drive.filter.offset_verdict == Verdict::Refused);
+    }
+    assert!(refused > 150, "{refused}");
+}
+
 /// The radar's jitter does not stay in the heading, nor does the bias of the gyro.
 #[test]
 fn the_coordinate_follows_the_radar_and_has_the_noise_of_the_sensor() {
@@ -372,7 +419,7 @@ proptest! {
                 _ => drive.filter.start_map(),
             }
             let covariance = drive.filter.covariance;
-            let scale = Matrix4::from_diagonal(&covariance.diagonal().map(|it| 1.0 / it.max(1e-30).sqrt()));
+            let scale = Matrix5::from_diagonal(&covariance.diagonal().map(|it| 1.0 / it.max(1e-30).sqrt()));
             let correlation = scale * covariance * scale;
             prop_assert!((correlation - correlation.transpose()).norm() < 1e-9, "{covariance}");
             prop_assert!(correlation.symmetric_eigenvalues().min() > -1e-9, "{covariance}");
