@@ -39,6 +39,9 @@ pub struct Row {
     pub keys: [&'static str; 2],
     /// The metric of its measurements: name and description.
     pub metric: [&'static str; 2],
+    /// The figures of a run: name, place in `summary.json`, and decimals; `None`: a count of what is
+    /// unusual.
+    pub figures: &'static [(&'static str, &'static str, Option<usize>)],
 }
 
 /// In the order of [`Witness::ALL`].
@@ -53,6 +56,13 @@ static TABLE: [Row; Witness::ALL.len()] = [
             "gyro_turns",
             "Turns that the gyro has measured: used, or refused since the radar contradicts.",
         ],
+        figures: &[
+            ("turns by the gyro", "/gyro/motions", Some(0)),
+            ("turns of the gyro doubted", "/gyro/doubted", None),
+            ("turns of the gyro refused", "/gyro/refused", None),
+            ("bias of the gyro, rad/s", "/gyro/bias_radps", Some(7)),
+            ("its deviation, rad/s", "/gyro/bias_sigma_radps", Some(7)),
+        ],
     },
     Row {
         measures: Measures::Distance,
@@ -64,6 +74,17 @@ static TABLE: [Row; Witness::ALL.len()] = [
             "wheel_distances",
             "Distances that the wheels have measured: used, or slipping.",
         ],
+        figures: &[
+            ("distances by the wheels", "/wheels/motions", Some(0)),
+            ("distances of slipping wheels", "/wheels/slips", None),
+            (
+                "motions predicted by the wheels",
+                "/wheels/predicted",
+                Some(0),
+            ),
+            ("scale of the wheels", "/wheels/scale", Some(4)),
+            ("its deviation", "/wheels/scale_sigma", Some(4)),
+        ],
     },
     Row {
         measures: Measures::Distance,
@@ -74,6 +95,17 @@ static TABLE: [Row; Witness::ALL.len()] = [
         metric: [
             "doppler_velocities",
             "Velocities by Doppler: used, or refused since the matches contradict.",
+        ],
+        figures: &[
+            ("velocities by Doppler", "/doppler/motions", Some(0)),
+            ("velocities by Doppler refused", "/doppler/refused", Some(0)),
+            (
+                "motions predicted by Doppler",
+                "/doppler/predicted",
+                Some(0),
+            ),
+            ("scale of Doppler", "/doppler/scale", Some(4)),
+            ("its deviation", "/doppler/scale_sigma", Some(4)),
         ],
     },
 ];

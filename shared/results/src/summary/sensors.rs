@@ -236,6 +236,9 @@ fn cause(kind: Witness, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) 
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
             set_s + delay_s
         )),
+        _ if is_wrong && kind.row().measures == Measures::Heading => Some(format!(
+            "it turns the other way, is of another drive, or `{section}.delay_s` or `{section}.noise_deg` is wrong"
+        )),
         _ => is_wrong.then(|| {
             format!(
                 "{up}`{section}.delay_s`, `{section}.scale` or the unit of the log is wrong: `gyre calibrate` finds them from a recording"
