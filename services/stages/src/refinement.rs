@@ -14,12 +14,12 @@ use gyre_stage::{
 };
 use gyre_transport::{RunError, writer::Draft};
 
-use crate::{estimates, points, sensors, unusable};
+use crate::{estimates, points, unusable};
 
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
-    let refiner = Refiner::new(&config, &sensors(launch)?, points.capacity);
+    let refiner = Refiner::new(&config, &launch.sensors()?, points.capacity);
     let refiner = refiner.map_err(RunError::input)?;
     launch.take_place()?;
     let manifest = &launch.manifest;

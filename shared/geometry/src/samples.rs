@@ -25,6 +25,6 @@ pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{GnssConfig, GnssFix};
 pub use integral::{Integrator, interval_of};
 pub use live::LiveSamples;
-pub use sample::{Logged, MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
+pub use sample::{Logged, MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample};
 pub use wheels::WheelsConfig;
-pub use witness::{Measures, Row, Witness};
+pub use witness::{Measures, Row, SampleKind, Witness};

@@ -11,13 +11,10 @@ use gyre_stage::{
 };
 use gyre_transport::{Listener, RunError, reader::Received};
 
-use crate::{
-    masking::{
-        live::NewestOnly,
-        lossless::{InOrder, Queue},
-        motions::Motions,
-    },
-    sensors,
+use crate::masking::{
+    live::NewestOnly,
+    lossless::{InOrder, Queue},
+    motions::Motions,
 };
 
 pub struct Scans {
@@ -59,7 +56,7 @@ impl Inputs for Scans {
         Ok(Self {
             queue,
             motions,
-            sensors: SampledSensors::new(&sensors(launch)?),
+            sensors: SampledSensors::new(&launch.sensors()?),
             sampled: None,
             window: launch.manifest.window,
             found: [None; 2],

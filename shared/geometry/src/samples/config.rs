@@ -96,10 +96,16 @@ pub trait SensorConfig {
     /// The log, for [`SensorKind::Log`].
     fn file(&self) -> &Path;
 
-    fn topic(&self) -> Option<&str>;
+    /// The topic that is configured; `None` also of a kind that no message of ROS 2 has.
+    fn topic(&self) -> Option<&str> {
+        None
+    }
 
-    /// The topic of a live sensor: the configured topic, or the usual one.
-    fn live_topic(&self) -> &str;
+    /// The topic of a live sensor: the configured topic, or the usual one; `None` of a kind that no
+    /// message of ROS 2 has.
+    fn live_topic(&self) -> Option<&str> {
+        None
+    }
 
     /// The address for receiving datagrams.
     fn listen(&self) -> &str;
@@ -114,6 +120,9 @@ pub trait SensorConfig {
     fn max_wait_ms(&self) -> f64 {
         0.0
     }
+
+    /// Delay of its stamps against the radar's, s.
+    fn delay_s(&self) -> f64;
 
     /// Longest time between two samples over which a rate is interpolated, s.
     fn max_gap_s(&self) -> f64 {
@@ -139,22 +148,51 @@ pub trait SensorConfig {
     /// Takes a sample over to the radar's clock and the vehicle's axes. `up` is the axis that
     /// points up if the configuration names no axis.
     fn on_radar(&self, sample: &Sample, up: Option<UpAxis>) -> Sample;
+
+    fn validate(&self) -> Result<(), SettingError>;
+
+    fn boxed(&self) -> Box<dyn SensorConfig>;
 }
 
-/// The settings of all sensors beside the radar that measure motions.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// The settings of all sensors beside the radar that measure motions: a section for each
+/// [`Witness`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct SensorConfigs {
+    /// The gyro, if there is one.
     pub gyro: GyroConfig,
+    /// The wheels, if their speed is known.
     pub wheels: WheelsConfig,
+    /// The velocity by the Doppler shift of single scans.
     pub doppler: DopplerConfig,
 }
 
 impl SensorConfigs {
-    /// Number of the kinds whose samples come with the scans.
-    pub const SAMPLED: usize = 2;
+    /// Returns the settings of a kind that comes as samples.
+    pub fn of(&self, kind: Witness) -> Option<&dyn SensorConfig> {
+        match kind {
+            Witness::Gyro => Some(&self.gyro),
+            Witness::Wheels => Some(&self.wheels),
+            Witness::Doppler => None,
+        }
+    }
 
-    pub fn sampled(&self) -> [(Witness, &dyn SensorConfig); Self::SAMPLED] {
-        [(Witness::Gyro, &self.gyro), (Witness::Wheels, &self.wheels)]
+    /// Returns the settings of the kinds that come as samples.
+    pub fn sampled(&self) -> Vec<&dyn SensorConfig> {
+        let kinds = Witness::ALL.into_iter();
+        kinds.filter_map(|kind| self.of(kind)).collect()
+    }
+
+    pub fn is_used(&self, kind: Witness) -> bool {
+        let sampled = self.of(kind).map(|it| it.kind().is_used());
+        sampled.unwrap_or_else(|| self.doppler.is_used())
+    }
+
+    pub fn validate(&self) -> Result<(), SettingError> {
+        self.sampled()
+            .into_iter()
+            .try_for_each(SensorConfig::validate)?;
+        self.doppler.validate()
     }
 }
 
@@ -166,7 +204,7 @@ pub(super) fn on_clock(sample: &Sample, delay_s: f64) -> i64 {
 
 /// Makes a section with `kind`, `file` and `topic` the settings of a kind of sensor.
 macro_rules! sensor_config {
-    ($config:ident is $of:ident on $live_topic:literal: $($method:item)+) => {
+    ($config:ident is $of:ident $(on $live_topic:literal)?: $($method:item)+) => {
         impl $config {
             pub fn is_used(&self) -> bool {
                 self.kind.is_used()
@@ -190,16 +228,26 @@ macro_rules! sensor_config {
                 self.file.as_deref().unwrap_or(std::path::Path::new(""))
             }
 
-            fn topic(&self) -> Option<&str> {
-                self.topic.as_deref()
-            }
+            $(
+                fn topic(&self) -> Option<&str> {
+                    self.topic.as_deref()
+                }
 
-            fn live_topic(&self) -> &str {
-                self.topic.as_deref().unwrap_or($live_topic)
-            }
+                fn live_topic(&self) -> Option<&str> {
+                    self.topic().or(Some($live_topic))
+                }
+            )?
 
             fn listen(&self) -> &str {
                 &self.listen
+            }
+
+            fn delay_s(&self) -> f64 {
+                self.delay_s
+            }
+
+            fn boxed(&self) -> Box<dyn $crate::samples::SensorConfig> {
+                Box::new(self.clone())
             }
 
             $($method)+
@@ -286,8 +334,10 @@ impl GyroConfig {
     pub fn max_scale_error(&self) -> f64 {
         4.0 * self.scale_sigma.max(LEANING)
     }
+}
 
-    pub fn validate(&self) -> Result<(), SettingError> {
+sensor_config! { GyroConfig is Gyro on "/imu/data":
+    fn validate(&self) -> Result<(), SettingError> {
         check_bounds! { self, "gyro":
             delay_s in DELAY,
             max_wait_ms in WAIT,
@@ -302,9 +352,7 @@ impl GyroConfig {
         }
         Ok(())
     }
-}
 
-sensor_config! { GyroConfig is Gyro on "/imu/data":
     fn max_wait_ms(&self) -> f64 {
         self.max_wait_ms
     }

@@ -47,14 +47,14 @@ impl Evidence {
 #[derive(Clone, Debug)]
 pub struct SampledSensors {
     configs: SensorConfigs,
-    /// In the order of [`SensorConfigs::sampled`].
-    integrators: [Integrator; SensorConfigs::SAMPLED],
+    /// In the order of [`Witness::ALL`].
+    integrators: [Option<Integrator>; Witness::ALL.len()],
 }
 
 impl SampledSensors {
     pub fn new(configs: &SensorConfigs) -> Self {
         Self {
-            integrators: configs.sampled().map(|(_, config)| Integrator::new(config)),
+            integrators: Witness::ALL.map(|kind| configs.of(kind).map(Integrator::new)),
             configs: configs.clone(),
         }
     }
@@ -62,36 +62,37 @@ impl SampledSensors {
     /// Takes the samples that come with the next scan, in the order of their stamps, and the times
     /// of its stamp and of its first and last azimuth, ns.
     pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
-        let all = self.integrators.iter_mut();
+        let all = self.integrators.iter_mut().flatten();
         all.for_each(|it| it.push(samples, stamp_ns, span_ns));
     }
 
     /// Takes the samples of a dropped scan: they count as samples of the next scan.
     pub fn drop_scan(&mut self, samples: &[Sample]) {
-        let all = self.integrators.iter_mut();
+        let all = self.integrators.iter_mut().flatten();
         all.for_each(|it| it.drop_scan(samples));
     }
 
     pub fn clear(&mut self) {
-        self.integrators.iter_mut().for_each(Integrator::clear);
+        let all = self.integrators.iter_mut().flatten();
+        all.for_each(Integrator::clear);
     }
 
     /// Returns the evidence about the motion to the last scan; nothing is measured where samples
     /// are missing.
     pub fn evidence(&self) -> AllEvidence {
-        let mut all = AllEvidence::default();
-        for ((kind, config), integrator) in
-            self.configs.sampled().into_iter().zip(&self.integrators)
-        {
-            all[kind as usize] = config.measure(integrator).unwrap_or_default();
-        }
-        all
+        Witness::ALL.map(|kind| {
+            let integrator = self.integrators[kind as usize].as_ref();
+            let measured = self.configs.of(kind).zip(integrator);
+            let measured = measured.and_then(|(config, it)| config.measure(it));
+            measured.unwrap_or_default()
+        })
     }
 
     /// Returns the velocities for the compensation of the sweeps of the scan before and of the
     /// scan: with the mean rate of the gyro during the sweep, if it has measured one.
     pub fn with_yaw_rates(&self, twists: [Option<Twist>; 2]) -> [Option<Twist>; 2] {
-        let [before, later] = self.integrators[Witness::Gyro as usize].means();
+        let gyro = self.integrators[Witness::Gyro as usize].as_ref();
+        let [before, later] = gyro.map_or([None; 2], Integrator::means);
         let [of_before, of_later] = twists;
         [(of_before, before), (of_later, later)].map(|(twist, rate)| {
             twist.map(|twist| Twist {

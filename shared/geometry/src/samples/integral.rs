@@ -16,6 +16,8 @@ pub struct Integrator {
     later: Option<Sweep>,
     /// Of scans that were dropped since the last one.
     dropped: Vec<Rate>,
+    /// From the first azimuth of the scan before to the last one of the scan.
+    pub(crate) rates: Vec<Rate>,
     /// From the stamp of the scan before to the stamp of the scan; `None` where samples are
     /// missing.
     pub(crate) integral: Option<Integral>,
@@ -32,7 +34,7 @@ pub(crate) struct Integral {
 }
 
 /// A stamp, ns, and the rate.
-type Rate = (i64, f64);
+pub(crate) type Rate = (i64, f64);
 
 #[derive(Clone, Debug, Default)]
 struct Sweep {
@@ -52,6 +54,7 @@ impl Integrator {
             earlier: None,
             later: None,
             dropped: Vec::new(),
+            rates: Vec::new(),
             integral: None,
         }
     }
@@ -77,6 +80,7 @@ impl Integrator {
 
     pub fn clear(&mut self) {
         self.dropped.clear();
+        self.rates.clear();
         (self.earlier, self.later, self.integral) = (None, None, None);
     }
 
@@ -86,23 +90,30 @@ impl Integrator {
         [&self.earlier, &self.later].map(|sweep| sweep.as_ref()?.mean)
     }
 
-    fn integrate(&self) -> Option<Integral> {
+    /// The stamp of the scan, ns.
+    pub(crate) fn stamp_ns(&self) -> Option<i64> {
+        self.later.as_ref().map(|scan| scan.stamp_ns)
+    }
+
+    fn integrate(&mut self) -> Option<Integral> {
+        self.rates.clear();
         let (before, scan) = (self.earlier.as_ref()?, self.later.as_ref()?);
         let since = before
             .rates
             .iter()
             .filter(|rate| rate.0 >= before.span_ns[0]);
-        let mut rates: Vec<Rate> = Vec::with_capacity(before.rates.len() + scan.rates.len());
+        let rates = &mut self.rates;
         for rate in since.chain(&self.dropped).chain(&scan.rates) {
             // A sample can come with two scans.
             let is_later = rates.last().is_none_or(|last| last.0 < rate.0);
             rates.extend(is_later.then_some(*rate));
         }
+        let stamps_ns = [before.stamp_ns, self.stamp_ns()?];
         Some(Integral {
-            sum: integral(&rates, [before.stamp_ns, scan.stamp_ns], self.max_gap_ns)?,
-            change: rate_at(&rates, scan.stamp_ns)? - rate_at(&rates, before.stamp_ns)?,
-            interval_s: seconds(scan.stamp_ns - before.stamp_ns),
-            samples: rates.len() as u64,
+            sum: integral(&self.rates, stamps_ns, self.max_gap_ns)?,
+            change: rate_at(&self.rates, stamps_ns[1])? - rate_at(&self.rates, stamps_ns[0])?,
+            interval_s: seconds(stamps_ns[1] - stamps_ns[0]),
+            samples: self.rates.len() as u64,
         })
     }
 }
@@ -209,7 +220,7 @@ mod tests {
     /// The samples of these rates, with samples of all other kinds between them.
     fn samples(of: SampleKind, rates: &[Rate]) -> Vec<Sample> {
         let sample = |(ns, rate): &Rate| {
-            SampleKind::OF_SCANS.map(|kind| {
+            SampleKind::ALL.map(|kind| {
                 let value = if kind == of { *rate } else { 9.0 };
                 Sample::of(kind, *ns, [value; 6])
             })

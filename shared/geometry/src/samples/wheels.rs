@@ -75,8 +75,8 @@ impl Default for WheelsConfig {
     }
 }
 
-impl WheelsConfig {
-    pub fn validate(&self) -> Result<(), SettingError> {
+sensor_config! { WheelsConfig is Wheels on "/odom":
+    fn validate(&self) -> Result<(), SettingError> {
         check_bounds! { self, "wheels":
             delay_s in DELAY,
             max_wait_ms in WAIT,
@@ -91,9 +91,7 @@ impl WheelsConfig {
         let bounds = ([1e-6, 10.0], "metres, 0.000001 to 10");
         check("wheels", "m_per_tick", step_m, bounds)
     }
-}
 
-sensor_config! { WheelsConfig is Wheels on "/odom":
     fn max_wait_ms(&self) -> f64 {
         self.max_wait_ms
     }

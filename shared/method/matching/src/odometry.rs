@@ -70,8 +70,12 @@ impl Odometry {
             search: parts.search,
             refiner: parts.refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
-            sensors: SampledSensors::new(&config.sensor_configs()),
-            doppler: config.doppler.is_used().then(DopplerEstimator::default),
+            sensors: SampledSensors::new(&config.sensors),
+            doppler: config
+                .sensors
+                .doppler
+                .is_used()
+                .then(DopplerEstimator::default),
             velocity: None,
             min_range_m: config.points.min_range_m,
             finder: LostAzimuthFinder::default(),

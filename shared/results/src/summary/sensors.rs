@@ -178,16 +178,11 @@ pub fn problem(
     counts: &Counts,
     gnss: Option<&GnssSummary>,
 ) -> Option<String> {
-    let config = &configuration.odometry;
+    let sensors = &configuration.odometry.sensors;
     // Without a refinement it is not known what gyro and wheels were used for.
     let motions = counts.processed.saturating_sub(1 + counts.breaks);
     let motions = counts.motions.map_or(0, |_| motions);
-    let settings = |kind| match kind {
-        Witness::Gyro => (config.gyro.is_used(), config.gyro.delay_s),
-        Witness::Wheels => (config.wheels.is_used(), config.wheels.delay_s),
-        Witness::Doppler => (config.doppler.is_used(), 0.0),
-    };
-    let is_unused = |kind: &Witness| settings(*kind).0 && counts.sensors.of(*kind).is_none();
+    let is_unused = |kind: &Witness| sensors.is_used(*kind) && counts.sensors.of(*kind).is_none();
     let sampled = || Witness::sampled().map(|(kind, _)| kind);
     if let Some(section) = sampled().find(is_unused).map(Witness::name)
         && motions > 0
@@ -202,13 +197,13 @@ pub fn problem(
         let is_wrong = match kind.row().measures {
             Measures::Turn => {
                 too_many(contradictions, it.motions, MAX_DOUBTED_SHARE)
-                    || (it.last.scale - 1.0).abs() > config.gyro.max_scale_error()
+                    || (it.last.scale - 1.0).abs() > sensors.gyro.max_scale_error()
             }
             Measures::Distance => too_many(contradictions, it.motions, MAX_SLIPPING_SHARE),
             Measures::Heading => too_many(contradictions, it.motions, MAX_DOUBTED_SHARE),
         };
         let section = kind.name();
-        let cause = cause(kind, settings(kind).1, it.delay_s, is_wrong)?;
+        let cause = cause(kind, sensors.of(kind)?.delay_s(), it.delay_s, is_wrong)?;
         let motions = it.motions;
         Some(match kind.row().measures {
             Measures::Turn => format!(
@@ -240,6 +235,9 @@ fn cause(kind: Witness, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) 
         Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
             set_s + delay_s
+        )),
+        _ if is_wrong && kind.row().measures == Measures::Heading => Some(format!(
+            "it turns the other way, is of another drive, or `{section}.delay_s` or `{section}.noise_deg` is wrong"
         )),
         _ => is_wrong.then(|| {
             format!(

@@ -44,8 +44,8 @@ fn refiner(config: &OdometryConfig) -> Result<Option<Refiner>, SetupError> {
         RefinementKind::None => Ok(None),
         RefinementKind::LocalMap if capacity == 0 => Err(SetupError::NoPoints),
         RefinementKind::LocalMap => {
-            let sensors = config.sensor_configs();
-            Ok(Some(Refiner::new(&config.refinement, &sensors, capacity)?))
+            let (config, sensors) = (&config.refinement, &config.sensors);
+            Ok(Some(Refiner::new(config, sensors, capacity)?))
         }
     }
 }

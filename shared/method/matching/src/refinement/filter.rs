@@ -117,7 +117,8 @@ impl SharedErrors {
         Witness::ALL.map(|kind| match kind {
             Witness::Gyro => Self::of_gyro(&configs.gyro),
             Witness::Wheels => of_scale(configs.wheels.scale_sigma, DELAY_S),
-            Witness::Doppler => of_scale(configs.doppler.scale_sigma, 0.0),
+            // An absolute heading has no filter of its own.
+            _ => of_scale(configs.doppler.scale_sigma, 0.0),
         })
     }
 

@@ -7,9 +7,7 @@ use std::collections::BTreeMap;
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
 use gyre_geometry::{
     OwnedScan, Pose, SparsePoint,
-    samples::{
-        AllEvidence, Sample, SampleKind, SampledSensors, SensorConfigs, SensorKind, Witness,
-    },
+    samples::{AllEvidence, Sample, SampleKind, SampledSensors, SensorKind, Witness},
     xy_yaw,
 };
 use gyre_matching::{
@@ -70,7 +68,8 @@ impl Drive {
             }
         };
         let scans = (0..scans).map(registered).collect();
-        (config.gyro.kind, config.wheels.kind) = (SensorKind::Auto, SensorKind::Auto);
+        let sensors = &mut config.sensors;
+        (sensors.gyro.kind, sensors.wheels.kind) = (SensorKind::Auto, SensorKind::Auto);
         Self {
             scans,
             dataset,
@@ -108,7 +107,7 @@ impl Drive {
         let wheels = write("wheels.csv", "stamp_ns,speed_m_s\n", wheels);
         let dataset = self.dataset.as_ref();
         let files = [gyro, wheels];
-        let mut sensors = self.config.sensors().into_iter().zip(&files);
+        let mut sensors = self.config.sensors.sampled().into_iter().zip(&files);
         sensors.try_fold(ScanSamples::None, |all, (sensor, file)| {
             let samples = SampleLog::read(sensor.of(), file, None)
                 .and_then(|log| ScanSamples::of_log(&log, sensor, dataset));
@@ -118,14 +117,9 @@ impl Drive {
 
     fn refine(&self, samples: &ScanSamples) -> Ran {
         let config = &self.config;
-        let configs = SensorConfigs {
-            gyro: config.gyro.clone(),
-            wheels: config.wheels.clone(),
-            ..SensorConfigs::default()
-        };
         let capacity = config.points.capacity;
-        let mut refiner = Refiner::new(&config.refinement, &configs, capacity).unwrap();
-        let mut sensors = SampledSensors::new(&configs);
+        let mut refiner = Refiner::new(&config.refinement, &config.sensors, capacity).unwrap();
+        let mut sensors = SampledSensors::new(&config.sensors);
         let mut counts: BTreeMap<String, u32> = BTreeMap::new();
         let mut motions = Vec::new();
         for (k, scan) in self.scans.iter().enumerate() {
