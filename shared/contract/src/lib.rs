@@ -7,6 +7,7 @@
 mod basis;
 pub mod control;
 mod follower;
+mod gnss;
 mod intake;
 mod item;
 pub mod layout;
@@ -28,6 +29,7 @@ mod witness;
 
 pub use basis::{Basis, WitnessCounts};
 pub use follower::{CorrectionHeader, FixHeader, LoopHeader, fix_status};
+pub use gnss::GnssHeader;
 pub use intake::IntakeHeader;
 pub use item::{FollowerId, Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window};
@@ -41,7 +43,7 @@ pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::ScanHeader;
 pub use stages::{StageTopics, composed};
 pub use topics::{
-    Correction, Fix, Footprint, GivenAnew, Intake, Loop, Masked, Motion, NumberedBy, Objects, Pose,
-    Refined, Rotation, Scan, all, named as topic_named, topic, topics,
+    Correction, Fix, Footprint, GivenAnew, Gnss, Intake, Loop, Masked, Motion, NumberedBy, Objects,
+    Pose, Refined, Rotation, Scan, all, named as topic_named, topic, topics,
 };
 pub use witness::{Measures, Witness};

@@ -111,9 +111,13 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
     assert_eq!((log.unusable, log.faults.unreadable), (None, 1));
     assert_eq!(log.faults.out_of_order, 1);
     assert_eq!(log.samples.len(), 2);
-    let noisy = format!("{text}unreadable\nunreadable,1\n");
+    let noisy = format!("{text}unreadable\nunreadable,1\nlost,5\nlost,2\n");
     let log = SampleLog::received(&written(&folder, "gnss.csv", &noisy));
     assert_eq!((log.samples.len(), log.faults.unreadable), (2, 3));
+    assert_eq!(
+        (log.faults.lost, &log.fault_figures()["lost"]),
+        (7, &7.into())
+    );
     let missing = SampleLog::received(&folder.path().join("none.csv"));
     assert!(missing.unusable.unwrap().contains("none.csv"));
 }
