@@ -102,14 +102,14 @@ impl LiveFixes {
             let Some(missing) = message.item.seq.checked_sub(self.next) else {
                 continue;
             };
-            self.next += missing + 1;
-            lost += missing + message.lost;
+            self.next = message.item.seq.saturating_add(1);
+            lost = missing.saturating_add(message.lost).saturating_add(lost);
             match self.end < MAX_LOG {
                 true => rows += &row(message),
-                false => lost += 1,
+                false => lost = lost.saturating_add(1),
             }
         }
-        lost += sent.saturating_sub(self.next);
+        lost = sent.saturating_sub(self.next).saturating_add(lost);
         self.next = self.next.max(sent);
         if lost > 0 {
             rows += &format!("lost,{lost}\n");
