@@ -107,9 +107,8 @@ impl SampleLog {
     /// Reads the log of a live receiver of fixes during a run. Lines without a fix are allowed. A
     /// run without usable fixes continues without them, and keeps the reason.
     pub fn received(path: &Path) -> Self {
-        let mut received = ReceivedFixes::new(path);
-        match received.read_on() {
-            Ok(()) => received.log(),
+        match ReceivedFixes::read(path) {
+            Ok(received) => received.log(),
             Err(error) => Self {
                 unusable: Some(error.to_string()),
                 ..Self::new(SampleKind::Gnss, path)

@@ -57,24 +57,26 @@ impl LiveFixes {
         let length = file.length()?;
         let [next, end] = taken(manifest).unwrap_or([0, length]);
         file.cut_to(end)?;
+        let start = match end {
+            0 => SampleLog::table_of_fixes(&[], false),
+            // A kill of the run may have cut the last row.
+            _ => "\n".to_owned(),
+        };
+        file.write_at(start.as_bytes(), end)?;
         let mut fixes = Self {
             port: Port::open(node, manifest)?,
             next,
             sync: GroupSync::start(&file)?,
+            end: file.length()?,
             file,
-            end,
             taken: Numbers::open(manifest, TAKEN)?,
-            received: ReceivedFixes::new(&path),
+            received: ReceivedFixes::read(&path).map_err(RunError::input)?,
             examined: 0,
             has_ended: false,
             manifest: manifest.clone(),
             config,
         };
-        fixes.append(match end {
-            0 => SampleLog::table_of_fixes(&[], false),
-            // A kill of the run may have cut the last row.
-            _ => "\n".to_owned(),
-        })?;
+        fixes.taken.write([fixes.next, fixes.end])?;
         Ok(fixes)
     }
 
@@ -116,11 +118,12 @@ impl LiveFixes {
         }
         match rows.is_empty() {
             true => Ok(()),
-            false => self.append(rows),
+            false => self.append(&rows),
         }
     }
 
-    fn append(&mut self, rows: String) -> Result<(), RunError> {
+    fn append(&mut self, rows: &str) -> Result<(), RunError> {
+        self.received.add(rows);
         self.file.write_at(rows.as_bytes(), self.end)?;
         self.end += rows.len() as u64;
         self.taken.write([self.next, self.end])?;
@@ -133,7 +136,6 @@ impl LiveFixes {
         if is_last {
             self.finish()?;
         }
-        self.received.read_on().map_err(RunError::input)?;
         let new = self.received.count() - self.examined;
         let least = if is_last {
             1

@@ -126,9 +126,11 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
 fn a_log_that_grows_is_read_on_to_what_it_is_as_a_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("gnss.csv");
-    let mut received = ReceivedFixes::new(&path);
     let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
+    std::fs::write(&path, &text).unwrap();
+    let mut received = ReceivedFixes::read(&path).unwrap();
     for rows in [100, 0, 1, 1, 2] {
+        let before = text.len();
         for _ in 0..rows {
             let k = text.lines().count() as i64;
             let (ns, longitude) = (START_NS + k * 10_000_000, 1e-8 * k as f64);
@@ -138,7 +140,7 @@ fn a_log_that_grows_is_read_on_to_what_it_is_as_a_whole() {
             };
         }
         std::fs::write(&path, &text).unwrap();
-        received.read_on().unwrap();
+        received.add(&text[before..]);
         let (log, whole) = (received.log(), SampleLog::read(Gnss, &path, None));
         assert_eq!(received.count(), log.samples.len());
         if rows > 0 {
