@@ -83,7 +83,7 @@ fn record(refined: &Refined) -> RefinementRecord {
         overlap: refined.overlap,
         support: refined.support,
         stationary: refined.stationary.into(),
-        witnesses: [refined.gyro, refined.wheels, refined.doppler].map(witness),
+        witnesses: refined.witnesses.map(witness),
     }
 }
 

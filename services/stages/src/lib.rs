@@ -1,7 +1,8 @@
 //! The stages of the pipeline, a module for each.
 
 use gyre_contract::Masked;
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{SparsePoint, samples::SensorConfigs};
+use gyre_stage::Launch;
 use gyre_storage::LogError;
 use gyre_transport::{RunError, reader::Received};
 
@@ -20,6 +21,14 @@ fn unusable(error: LogError) -> RunError {
         LogError::Busy(_) => RunError::Transient(format!("cannot open a file of the run: {error}")),
         _ => RunError::input(error),
     }
+}
+
+fn sensors(launch: &Launch) -> Result<SensorConfigs, RunError> {
+    Ok(SensorConfigs {
+        gyro: launch.section("gyro")?,
+        wheels: launch.section("wheels")?,
+        doppler: launch.section("doppler")?,
+    })
 }
 
 fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], RunError> {

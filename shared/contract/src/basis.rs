@@ -1,13 +1,11 @@
 //! The basis of motions: the radar, other sensors, or a guess; and how often the others were used.
 
+use gyre_geometry::samples::Witness;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use crate::{
-    refinement::{RefinementRecord, initial_guess, outcome, verdict},
-    witness::Witness,
-};
+use crate::refinement::{RefinementRecord, initial_guess, outcome, verdict};
 
-crate::named! {
+gyre_geometry::named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Basis {
         /// Two scans: there is no refinement, or the chain starts here.

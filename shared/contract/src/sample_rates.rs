@@ -5,7 +5,9 @@ use std::collections::VecDeque;
 use gyre_geometry::samples::{Sample, SampleKind};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use crate::{scan::ScanHeader, witness::Witness};
+use gyre_geometry::samples::Witness;
+
+use crate::scan::ScanHeader;
 
 /// Scans for measuring rates: ten seconds at 4 Hz.
 const SCANS: usize = 41;

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT},
     check_bounds,
-    samples::{Sample, SampleKind},
+    samples::{
+        DopplerConfig, Evidence, Sample, SampleKind, WheelsConfig, Witness, integral::Integrator,
+    },
 };
 
 /// Least standard deviation of a scale: an axis leans by up to 8 degrees, in bends and on slopes.
@@ -127,9 +129,32 @@ pub trait SensorConfig {
         None
     }
 
+    /// Returns the evidence about the motion from the scan before to a scan; `None` where samples
+    /// are missing.
+    fn measure(&self, _: &Integrator) -> Option<Evidence> {
+        None
+    }
+
     /// Takes a sample over to the radar's clock and the vehicle's axes. `up` is the axis that
     /// points up if the configuration names no axis.
     fn on_radar(&self, sample: &Sample, up: Option<UpAxis>) -> Sample;
+}
+
+/// The settings of all sensors beside the radar that measure motions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SensorConfigs {
+    pub gyro: GyroConfig,
+    pub wheels: WheelsConfig,
+    pub doppler: DopplerConfig,
+}
+
+impl SensorConfigs {
+    /// Number of the kinds whose samples come with the scans.
+    pub const SAMPLED: usize = 2;
+
+    pub fn sampled(&self) -> [(Witness, &dyn SensorConfig); Self::SAMPLED] {
+        [(Witness::Gyro, &self.gyro), (Witness::Wheels, &self.wheels)]
+    }
 }
 
 /// The stamp of a sample on the radar's clock, ns, by the delay of the sensor's.
@@ -256,9 +281,9 @@ impl Default for GyroConfig {
 }
 
 impl GyroConfig {
-    /// Returns whether a gyro with these settings can have a learnt scale.
-    pub fn allows_scale(&self, scale: f64) -> bool {
-        (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
+    /// The farthest that a learnt scale of a gyro with these settings can be from 1.
+    pub fn max_scale_error(&self) -> f64 {
+        4.0 * self.scale_sigma.max(LEANING)
     }
 
     pub fn validate(&self) -> Result<(), SettingError> {
@@ -289,6 +314,20 @@ sensor_config! { GyroConfig is Gyro on "/imu/data":
 
     fn up(&self) -> Option<UpAxis> {
         self.up
+    }
+
+    /// Returns the turn and the mean rate during the sweep, both with the bias.
+    fn measure(&self, between: &Integrator) -> Option<Evidence> {
+        let integral = between.integral?;
+        let [_, sweep_rate_radps] = between.means();
+        let by_time = self.time_sigma_s * integral.change;
+        let walk = self.noise_rad_per_sqrt_s.powi(2) * integral.interval_s;
+        Some(Evidence {
+            samples: integral.samples,
+            interval_s: integral.interval_s,
+            value: [integral.sum, sweep_rate_radps?],
+            covariance: [walk + by_time * by_time, 0.0, 0.0],
+        })
     }
 
     /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its

@@ -80,6 +80,11 @@ impl Serialize for Named<'_> {
                 map.serialize_entry("scale", &last.scale)?;
                 map.serialize_entry("scale_sigma", &last.scale_sigma)?;
             }
+            Measures::Heading => {
+                map.serialize_entry(refused, &count.refused)?;
+                map.serialize_entry("offset_rad", &last.bias)?;
+                map.serialize_entry("offset_sigma_rad", &last.bias_sigma)?;
+            }
         }
         if row.samples.is_some() {
             map.serialize_entry("delay_s", &count.delay_s)?;
@@ -102,6 +107,8 @@ impl SensorCounter {
                 // A registered turn depends on the gyro.
                 Measures::Turn => motion.searched[2],
                 Measures::Distance => motion.x_m,
+                // A heading, whose offset is unknown, is no motion.
+                Measures::Heading => continue,
             };
             self.clocks[kind as usize].add(pose, by_radar, record.of(kind).measured());
         }
@@ -195,9 +202,10 @@ pub fn problem(
         let is_wrong = match kind.row().measures {
             Measures::Turn => {
                 too_many(contradictions, it.motions, MAX_DOUBTED_SHARE)
-                    || !config.gyro.allows_scale(it.last.scale)
+                    || (it.last.scale - 1.0).abs() > config.gyro.max_scale_error()
             }
             Measures::Distance => too_many(contradictions, it.motions, MAX_SLIPPING_SHARE),
+            Measures::Heading => too_many(contradictions, it.motions, MAX_DOUBTED_SHARE),
         };
         let section = kind.name();
         let cause = cause(kind, settings(kind).1, it.delay_s, is_wrong)?;
@@ -205,6 +213,9 @@ pub fn problem(
         Some(match kind.row().measures {
             Measures::Turn => format!(
                 "the {section} contradicts the radar: {contradictions} of its {motions} turns were doubted or refused; {cause}, and {section}.kind=none leaves it out"
+            ),
+            Measures::Heading => format!(
+                "the {section} contradicts the radar: {contradictions} of its {motions} headings were refused; {cause}, and {section}.kind=none leaves it out"
             ),
             Measures::Distance => format!(
                 "the {section} contradict the radar: {contradictions} of their {motions} distances are not those that it sees; {cause}, and {section}.kind=none leaves them out"
@@ -223,7 +234,7 @@ fn cause(kind: Witness, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) 
     let section = kind.name();
     let up = match kind.row().measures {
         Measures::Turn => "`gyro.up`, ",
-        Measures::Distance => "",
+        Measures::Distance | Measures::Heading => "",
     };
     match measured {
         Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(

@@ -1,5 +1,7 @@
 use crate::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
-use gyre_geometry::samples::{DopplerConfig, GyroConfig, SensorConfig, WheelsConfig};
+use gyre_geometry::samples::{
+    DopplerConfig, GyroConfig, SensorConfig, SensorConfigs, WheelsConfig,
+};
 use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
 use schemars::JsonSchema;
@@ -38,6 +40,14 @@ impl OdometryConfig {
     /// The sensors whose samples come with the scans.
     pub fn sensors(&self) -> [&dyn SensorConfig; 2] {
         [&self.gyro, &self.wheels]
+    }
+
+    pub(crate) fn sensor_configs(&self) -> SensorConfigs {
+        SensorConfigs {
+            gyro: self.gyro.clone(),
+            wheels: self.wheels.clone(),
+            doppler: self.doppler.clone(),
+        }
     }
 
     pub fn has_samples(&self) -> bool {

@@ -1,6 +1,6 @@
 //! The kinds of sensors beside the radar: the measured part of a motion, and the names in outputs.
 
-use gyre_geometry::samples::SampleKind;
+use crate::samples::SampleKind;
 
 crate::named! {
     /// A kind of sensor beside the radar, with its name in configurations and outputs. Of two that
@@ -20,6 +20,8 @@ pub enum Measures {
     Turn,
     /// The distance ahead, m.
     Distance,
+    /// The heading itself, rad, with an unknown constant offset.
+    Heading,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +34,7 @@ pub struct Row {
     pub word: &'static str,
     /// The name of a measurement that is not used, and of many of them.
     pub refused: [&'static str; 2],
-    /// The keys of [`WitnessCounts`](crate::WitnessCounts) for those used and those not used.
+    /// The keys of `WitnessCounts` in a run's report for those used and those not used.
     pub keys: [&'static str; 2],
     /// The metric of its measurements: name and description.
     pub metric: [&'static str; 2],
@@ -76,7 +78,7 @@ static TABLE: [Row; Witness::ALL.len()] = [
 ];
 
 impl Witness {
-    pub fn row(self) -> &'static Row {
+    pub const fn row(self) -> &'static Row {
         &TABLE[self as usize]
     }
 
