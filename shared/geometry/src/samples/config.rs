@@ -110,10 +110,9 @@ pub trait SensorConfig {
     /// The address for receiving datagrams.
     fn listen(&self) -> &str;
 
-    /// Returns whether a run receives datagrams at that address. The source passes fixes of ROS 2
-    /// on to there.
+    /// Returns whether a run receives datagrams at that address.
     fn receives(&self) -> bool {
-        self.kind() == SensorKind::Udp || self.of() == SampleKind::Gnss && self.kind().is_live()
+        self.kind() == SensorKind::Udp
     }
 
     /// Longest time for which a scan of a live radar waits for its samples, ms.
