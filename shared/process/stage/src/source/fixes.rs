@@ -48,10 +48,8 @@ impl Fixes {
         }
         let receiver = config.receives().then(|| Receiver::open(&config));
         let fixes = Self::of(receiver.transpose()?, &launch.node, &launch.manifest)?;
-        let from = match config.receives() {
-            true => config.listen(),
-            false => config.live_topic(),
-        };
+        let topic = config.live_topic().filter(|_| !config.receives());
+        let from = topic.unwrap_or(config.listen());
         match fixes.next {
             0 => tracing::info!(from, "waiting for fixes of GNSS"),
             _ => tracing::warn!("fixes of GNSS that came while there was no source are lost"),
