@@ -89,10 +89,8 @@ fn difference(got: &[f32], expected: &[f64]) -> (f64, f64) {
 
 fn config(n: usize, sampling: Sampling) -> RasterConfig {
     RasterConfig {
-        n,
-        cell_m: 0.8,
         sampling,
-        ..RasterConfig::default()
+        ..RasterConfig::of(n, 0.8)
     }
 }
 
