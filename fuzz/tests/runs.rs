@@ -10,7 +10,6 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_geometry::OwnedScan;
 use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingWriter};
 
 use crate::recordings::folder;
@@ -82,11 +81,9 @@ fn use_run(path: &Path) -> Result<(), Failure> {
     let refused = messages.filter_map(Result::err).last();
 
     let mut dataset = gyre_recording::open(path, &DatasetOptions::default())?;
-    let mut scan = OwnedScan::with_limits(dataset.limits());
     // A damaged number of a scan leaves a gap of any length.
-    for index in (dataset.first()..dataset.len()).take(100) {
-        if let Ok(geometry) = dataset.read(index, scan.slot()) {
-            scan.geometry = geometry;
+    for index in dataset.scans().take(100) {
+        if let Ok(scan) = dataset.scan(index) {
             scan.view().check().unwrap();
         }
     }

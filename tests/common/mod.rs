@@ -245,9 +245,16 @@ impl Run {
         self.argument("--set", sentence)
     }
 
+    /// Sets several keys, whose sentences spaces part.
+    pub fn sets(self, sentences: &str) -> Self {
+        sentences.split_whitespace().fold(self, Self::set)
+    }
+
     pub fn masked_by(self, card: &Path) -> Self {
-        self.set("masking.kind=learned")
-            .set(&format!("masking.model='{}'", card.display()))
+        self.sets(&format!(
+            "masking.kind=learned masking.model='{}'",
+            card.display()
+        ))
     }
 
     pub fn into(mut self, out: &Path) -> Self {

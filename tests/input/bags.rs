@@ -61,8 +61,7 @@ fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
     let whole = whole(recording::SCANS);
     let run = Run::small().data(whole.path()).set("slam.kind=graph");
     // Some motions are predicted.
-    let run = run.set("refinement.min_overlap=0.98");
-    let run = run.set("refinement.firm_overlap=0.98");
+    let run = run.sets("refinement.min_overlap=0.98 refinement.firm_overlap=0.98");
     run.finish()
         .failed_with(&["hardly measured this trajectory"]);
     let motions = odometry::rows(&run.odometry()).len();
@@ -93,10 +92,7 @@ fn the_objects_of_a_run_and_of_its_recording_are_those_of_the_results_to_another
     let run = Run::small().data(recording::around_a_block());
     let recorded = bag(&run, "drive.mcap");
     let run = run.argument("--record", recorded.to_str().unwrap());
-    let run = run
-        .set("run.window=32")
-        .set("objects.kind=tracks")
-        .rate("20");
+    let run = run.sets("run.window=32 objects.kind=tracks").rate("20");
     run.complete();
     for (source, name) in [(run.out(), "of_run"), (&recorded, "of_recording.mcap")] {
         let path = bag(&run, name);

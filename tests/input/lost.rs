@@ -95,8 +95,7 @@ fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
 fn a_run_that_waits_for_its_input_can_be_interrupted() {
     let (recording, run) = whole(MODERATE);
     // A time longer than any run is no limit.
-    let run = run.set("source.retry_s=1e300");
-    let run = run.set("run.stall_timeout_s=1e300");
+    let run = run.sets("source.retry_s=1e300 run.stall_timeout_s=1e300");
     let running = run.started(MIDDLE);
     take_away(recording.path());
     thread::sleep(Duration::from_millis(300));

@@ -63,8 +63,7 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
         "slam.kind=graph slam.map='nowhere'|nowhere is not a map",
     ] {
         let (settings, words) = case.split_once('|').unwrap();
-        let settings = settings.split(' ');
-        let run = settings.fold(Run::of_recording(), Run::set);
+        let run = Run::of_recording().sets(settings);
         refused(run, &words.split('|').collect::<Vec<_>>());
     }
 }

@@ -32,8 +32,8 @@ fn receiving(radar: &Radar, address: &str, scans: usize) -> Run {
 
 /// A run whose corrected trajectory takes fixes at this address.
 pub fn with_graph(run: Run, address: &str) -> Run {
-    let run = run.set("slam.kind=graph").set("run.window=32");
-    with_antenna(run.set(&format!("gnss.listen='{address}'")))
+    let settings = format!("slam.kind=graph run.window=32 gnss.listen='{address}'");
+    with_antenna(run.sets(&settings))
 }
 
 /// The messages that the receiver sends during the drive.

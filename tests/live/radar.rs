@@ -175,8 +175,7 @@ fn datagrams_give_the_motions_of_the_recording() {
     let all = stamps(&all);
     let first = &all.iter().find(|row| row[0] == *begun).unwrap()[1];
     let recorded = Run::small().data(whole.path());
-    let recorded = recorded.set(&format!("source.first={first}"));
-    let recorded = recorded.set(&format!("source.scans={scans}"));
+    let recorded = recorded.sets(&format!("source.first={first} source.scans={scans}"));
     assert_eq!(motions(&live), motions(&recorded.complete()));
 }
 

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use gyre_colossus::{Azimuth, Configuration, Powers, asterix, write_keep_alive};
+use gyre_colossus::{Azimuth, ClockFormat, Configuration, asterix, write_keep_alive};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -164,23 +164,10 @@ fn datagrams_of_others_are_passed_over_and_counted() {
     let options = ["--repeat", "--rate", "1"];
     let _other = Radar::to(&["--udp", &to], recording::small(), &options);
     let forger = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let large = Configuration {
-        azimuth_samples: 400,
-        bin_size: 438,
-        range_in_bins: 60_000,
-        encoder_size: 5600,
-        rotation_mhz: 4000,
-        ..Configuration::default()
-    };
+    let large = Configuration::usual(400, 60_000);
+    let azimuth = Azimuth::at(14, 0, ClockFormat::default(), &[9; 4]);
     let mut number = 0;
     while !running.is_over() {
-        let azimuth = Azimuth {
-            sweep_counter: 0,
-            encoder: 14,
-            seconds: [0; 4],
-            split_seconds: [0; 4],
-            powers: Powers::Eight(&[9; 4]),
-        };
         asterix::write_azimuth(&large, &azimuth, &mut number, &mut |datagram| {
             forger.send_to(datagram, &to).unwrap();
         });

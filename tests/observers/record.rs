@@ -90,9 +90,8 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
 #[test]
 fn a_run_that_ended_before_its_first_pose_goes_on_with_its_recording() {
     for (mode, rate) in [("lossless", "max"), ("live", "4")] {
-        let run = recorded(&played().rate(rate)).set(ALL);
-        let run = run.set("source.scans=6").set(&format!("run.mode={mode}"));
-        let run = run.set("stages.refinement.delay_ms=800");
+        let settings = format!("run.mode={mode} source.scans=6 stages.refinement.delay_ms=800");
+        let run = recorded(&played().rate(rate)).set(ALL).sets(&settings);
         let mut running = run.start();
         running.await_stages();
         await_file(&file(&run));

@@ -198,10 +198,8 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
 #[test]
 fn a_stage_or_a_follower_that_hangs_is_restarted_alone() {
     for name in ["rotation-search", "loop-closure"] {
-        let run = Run::of_recording()
-            .rate("1")
-            .set("slam.kind=graph")
-            .set("run.stall_timeout_s=2");
+        let run = Run::of_recording().rate("1");
+        let run = run.sets("slam.kind=graph run.stall_timeout_s=2");
         let running = run.started(4);
         let status = await_status(&run, "followers", |it| {
             process(it, "loop-closure")["activity"] == "waiting"

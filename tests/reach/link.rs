@@ -26,8 +26,7 @@ fn side(side: &str, cut: &str, endpoint: &str) -> Run {
         "robot" => Run::of_recording(),
         _ => Run::small(),
     };
-    let run = run.set(&format!("link.side='{side}'"));
-    run.set(&format!("link.cut='{cut}'")).set(endpoint)
+    run.sets(&format!("link.side='{side}' link.cut='{cut}' {endpoint}"))
 }
 
 /// Both sides over a free port of this machine: the base, and the robot.
@@ -120,8 +119,9 @@ fn a_robot_that_plays_another_drive_is_refused() {
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let [first, second] = [recording::small(), other.path()].map(|data| {
         let robot = Run::small().data(data).rate("2");
-        let robot = robot.set("link.side='robot'").set("link.cut='motion'");
-        robot.set(&format!("link.connect=['{address}']"))
+        robot.sets(&format!(
+            "link.side='robot' link.cut='motion' link.connect=['{address}']"
+        ))
     });
     let here = first.started(6);
     here.kill_supervisor();

@@ -55,11 +55,9 @@ impl Driver {
 
 /// A run that receives so many scans from a topic in a domain.
 fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
-    let run = run
-        .argument("--ros2", topic)
-        .set("source.interface='127.0.0.1'");
-    let run = run.set(&format!("source.domain={domain}"));
-    run.set(&format!("source.scans={scans}"))
+    run.argument("--ros2", topic).sets(&format!(
+        "source.interface='127.0.0.1' source.domain={domain} source.scans={scans}"
+    ))
 }
 
 /// Of a driver as it is, of one before 2024, and of one that publishes whole turns.
@@ -113,8 +111,7 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
     let domain = domain(9);
     let _driver = Driver::playing(whole.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
-    let run = run.set("gyro.kind=ros2").set("gyro.max_wait_ms=200");
-    let run = run.set("wheels.kind=ros2");
+    let run = run.sets("gyro.kind=ros2 gyro.max_wait_ms=200 wheels.kind=ros2");
     let live = run.complete();
     let summary = run.summary();
     let used = ["gyro", "wheels"].map(|of| summary[of]["motions"].as_u64().unwrap_or(0) as usize);
@@ -135,8 +132,8 @@ fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
     let domain = domain(11);
     let _driver = Driver::playing(drive.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, gnss::SCANS);
-    let run = recorded(&gnss::with_graph(run, &address(6))).set("gnss.kind=ros2");
-    let run = run.set("gnss.topic='/fix'");
+    let run = recorded(&gnss::with_graph(run, &address(6)));
+    let run = run.sets("gnss.kind=ros2 gnss.topic='/fix'");
     run.complete();
     let gnss = run.summary()["gnss"].clone();
     let fixes = gnss["fixes"].as_u64().unwrap() as usize;

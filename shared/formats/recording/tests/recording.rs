@@ -11,7 +11,6 @@ use std::{
 use bytemuck::{Zeroable, bytes_of};
 use gyre_contract::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::OwnedScan;
 use gyre_recording::{
     Head, Incoming, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,
     file::McapFile, open, open_recording,
@@ -152,12 +151,11 @@ fn a_dataset_has_the_recorded_scans_under_their_numbers_and_names_the_missing_on
     let (_folder, path) = recorded(&[0, 1, 3]);
     let mut dataset = open(&path, &DatasetOptions::default()).unwrap();
     assert_eq!((dataset.first(), dataset.len()), (10, 14));
-    let mut own = OwnedScan::with_limits(dataset.limits());
-    own.geometry = dataset.read(11, own.slot()).unwrap();
+    let own = dataset.scan(11).unwrap();
     assert_eq!(own.geometry.range_offset_m, -0.25);
     assert_eq!(own.azimuth_rad[..4], [0.0, 1.5, 3.0, 4.5]);
     assert_eq!(own.view().row(2), &scan(1).payload[11 + 42..][..10]);
-    let missing = dataset.read(12, own.slot()).unwrap_err();
+    let missing = dataset.scan(12).unwrap_err();
     assert!(missing.to_string().contains("has no scan 12"), "{missing}");
     let notes = dataset.notes().join(" ");
     assert!(notes.contains("1 of the scans 10 to 13"), "{notes}");
@@ -366,9 +364,8 @@ fn whatever_is_damaged_of_a_chunk_its_scan_alone_cannot_be_read_and_the_place_is
             assert!(damage.contains("is damaged at byte"), "{damage}");
             assert!(dataset.notes().join(" ").contains(&damage));
             assert_eq!((dataset.first(), dataset.len()), (10, 16));
-            let mut own = OwnedScan::with_limits(dataset.limits());
-            let scans = dataset.scans().map(|scan| dataset.read(scan, own.slot()));
-            assert_eq!(scans.filter(Result::is_ok).count(), read, "{damage}");
+            let scans = dataset.scans().filter(|scan| dataset.scan(*scan).is_ok());
+            assert_eq!(scans.count(), read, "{damage}");
         }
     }
     fs::write(&path, &whole[..chunks[4] + 9]).unwrap();

@@ -13,7 +13,7 @@ fn a_recording_that_begins_within_a_turn_begins_with_the_next() {
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&messages));
     assert_eq!(dataset.len(), 3);
-    assert_is(&read(dataset.as_mut(), 0).unwrap(), 1);
+    assert_is(&dataset.scan(0).unwrap(), 1);
 }
 
 #[test]
@@ -23,13 +23,10 @@ fn damaged_messages_are_scans_that_cannot_be_read() {
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&messages));
     assert_eq!(dataset.len(), 5);
-    let Err(error) = read(dataset.as_mut(), 2) else {
-        panic!("a damaged scan was read");
-    };
-    let words = "the message of scan 2 in ";
-    assert!(error.to_string().starts_with(words), "{error}");
+    let error = dataset.scan(2).unwrap_err().to_string();
+    assert!(error.starts_with("the message of scan 2 in "), "{error}");
     for turn in [0, 1, 3, 4] {
-        assert_is(&read(dataset.as_mut(), turn).unwrap(), turn);
+        assert_is(&dataset.scan(turn).unwrap(), turn);
     }
     let notes = dataset.notes().join(" ");
     let words = "1 messages with scans cannot be decoded, and are skipped (the first: ";
@@ -75,7 +72,7 @@ fn whatever_is_damaged_of_a_chunk_it_alone_is_left_out_and_named() {
             );
             assert!(dataset.notes().join(" ").contains(&damage), "{number}");
             assert_eq!(dataset.len(), 7, "{number}");
-            assert_is(&read(dataset.as_mut(), 6).unwrap(), 7);
+            assert_is(&dataset.scan(6).unwrap(), 7);
         }
         fs::write(&path, &whole[..at + 100]).unwrap();
         let mut dataset = opened(&path);
