@@ -35,7 +35,7 @@ pub use browser::Browser;
 pub use ended::Ended;
 pub use leftovers::{assert_nothing_left, assert_nothing_left_of};
 pub use other_user::OtherUser;
-pub use processes::{Pid, cpu_time, send};
+pub use processes::{Pid, send};
 pub use running::{Running, poses_of};
 pub use server::Server;
 pub use shared::Shared;
@@ -88,10 +88,14 @@ macro_rules! finished {
 }
 pub(crate) use finished;
 
+pub fn works(command: &[&str]) -> bool {
+    let output = Command::new(command[0]).args(&command[1..]).output();
+    output.is_ok_and(|output| output.status.success())
+}
+
 /// Returns whether a command works here; prints why a test is skipped.
 pub fn can(command: &[&str]) -> bool {
-    let output = Command::new(command[0]).args(&command[1..]).output();
-    let can = output.is_ok_and(|output| output.status.success());
+    let can = works(command);
     if !can {
         println!("skips what needs `{}`", command.join(" "));
     }

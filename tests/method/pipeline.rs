@@ -55,13 +55,6 @@ fn all_results_are_there_and_account_for_every_scan() {
 }
 
 #[test]
-fn a_repetition_gives_the_same_bytes() {
-    let run = Run::of_recording();
-    assert_eq!(run.complete(), undisturbed());
-    assert_eq!(run.complete(), undisturbed(), "in the same folder");
-}
-
-#[test]
 fn the_resolved_configuration_plays_the_data_that_were_named_instead_of_a_simulation() {
     let run = Run::simulated(3).data(recording::small());
     assert_eq!(run.complete(), undisturbed());

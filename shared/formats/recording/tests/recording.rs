@@ -2,60 +2,36 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod written;
+
 use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
 
-use bytemuck::{Zeroable, bytes_of};
-use gyre_contract::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
+use gyre_contract::{Item, MotionHeader, PoseHeader, RotationHeader};
 use gyre_datasets::DatasetOptions;
 use gyre_recording::{
     Head, Incoming, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,
     file::McapFile, open, open_recording,
 };
 use mcap::records::{MessageHeader, Metadata, Record, op};
+use written::{head, message};
 
 const SCANS: u64 = 6;
-const START_NS: i64 = 1_549_986_607_000_000_000;
 
 fn item(seq: u64) -> Item {
     Item {
-        seq,
         scan: seq + 10,
         previous_scan: seq + 10,
         published: seq,
-        stamp_ns: START_NS + seq as i64 * 250_000_000,
-        ..Item::default()
+        ..written::item(seq)
     }
 }
 
-/// A scan with metadata before each row, as in images of Oxford.
 fn scan(seq: u64) -> Incoming {
-    let mut header = ScanHeader {
-        item: item(seq),
-        azimuths: 4,
-        bins: 10,
-        stride: 21,
-        first_byte: 11,
-        range_resolution_m: 0.5,
-        range_offset_m: -0.25,
-        clockwise: 1,
-        ..ScanHeader::zeroed()
-    };
-    header.azimuth_stamp_ns[..4].fill(header.item.stamp_ns);
-    header.azimuth_rad[..4].copy_from_slice(&[0.0, 1.5, 3.0, 4.5]);
-    Incoming {
-        topic: "scan",
-        header: bytes_of(&header).to_vec(),
-        payload: (0..11 + 3 * 21 + 10)
-            .map(|byte| (byte * 7 + seq as i32) as u8)
-            .collect(),
-        received_ns: START_NS,
-        missed: 0,
-        skipped: None,
-    }
+    written::scan(item(seq))
 }
 
 fn pose(seq: u64) -> Incoming {
@@ -65,24 +41,8 @@ fn pose(seq: u64) -> Incoming {
         ..PoseHeader::default()
     };
     Incoming {
-        topic: "pose",
-        header: bytes_of(&header).to_vec(),
-        payload: Vec::new(),
-        received_ns: START_NS,
         missed: 2,
-        skipped: None,
-    }
-}
-
-fn head(id: &str, part: usize) -> Head {
-    Head {
-        id: id.to_owned(),
-        part,
-        configuration: "[dataset]\nformat = \"radiate\"\nazimuth_eccentricity_rad = 0.0025\n"
-            .to_owned(),
-        topics: ["scan", "pose"].map(str::to_owned).to_vec(),
-        scan_bytes: 128,
-        mode: "lossless".to_owned(),
+        ..message("pose", &header)
     }
 }
 
@@ -268,14 +228,7 @@ fn of(generation: u32, numbered_from: u64, seq: u64, scan: u64) -> Incoming {
         },
         ..MotionHeader::default()
     };
-    Incoming {
-        topic: "motion",
-        header: bytes_of(&header).to_vec(),
-        payload: Vec::new(),
-        received_ns: START_NS,
-        missed: 0,
-        skipped: None,
-    }
+    message("motion", &header)
 }
 
 #[test]
@@ -378,7 +331,7 @@ fn whatever_is_damaged_of_a_chunk_its_scan_alone_cannot_be_read_and_the_place_is
 fn write_chunk(path: &Path, table: BTreeMap<String, String>, messages: u32) {
     let head = path.with_extension("head");
     let _ = fs::remove_file(&head);
-    RecordingWriter::create(&head, &self::head("a", 1))
+    RecordingWriter::create(&head, &written::head("a", 1))
         .unwrap()
         .finish()
         .unwrap();
