@@ -73,6 +73,13 @@ pub fn python() -> String {
     env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned())
 }
 
+/// A script of `tests/` for this Python.
+pub fn script(path: &str) -> Command {
+    let mut command = Command::new(python());
+    command.arg(Path::new(crate::PROJECT).join("tests").join(path));
+    command
+}
+
 pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)
 }
@@ -349,6 +356,21 @@ impl Run {
 
     pub fn summary(&self) -> Value {
         serde_json::from_str(&self.result("summary.json")).unwrap()
+    }
+
+    /// A number of the summary; its key may be a path of keys.
+    pub fn count(&self, key: &str) -> u64 {
+        let summary = self.summary();
+        let count = summary.pointer(&format!("/{key}"));
+        let count = count.and_then(Value::as_u64);
+        count.unwrap_or_else(|| panic!("no {key} in {summary:#}"))
+    }
+
+    /// Asserts numbers of the summary: `key=number`, with spaces between.
+    pub fn assert_counts(&self, expected: &str) {
+        for (key, count) in expected.split(' ').filter_map(|it| it.split_once('=')) {
+            assert_eq!(self.count(key).to_string(), count, "{key}");
+        }
     }
 
     pub fn result(&self, name: impl AsRef<Path>) -> String {

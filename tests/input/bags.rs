@@ -4,13 +4,12 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 use serde_json::Value;
 
 use crate::{
-    common::{Ended, Run, finished, odometry, python, recording, recording::with_constants},
+    common::{Ended, Run, finished, odometry, recording, recording::with_constants, script},
     live::radar::whole,
     reach::python_has,
 };
@@ -36,9 +35,8 @@ fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
     if !python_has("rosbags, numpy") {
         return None;
     }
-    let script = Path::new(crate::PROJECT).join("tests/input/bags/check.py");
-    let mut command = Command::new(python());
-    command.arg(script).arg(bag).arg(out).args(turned);
+    let mut command = script("input/bags/check.py");
+    command.arg(bag).arg(out).args(turned);
     let ended = Ended::of(command);
     ended.succeeded();
     Some(serde_json::from_str(&ended.stdout).unwrap())

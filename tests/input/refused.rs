@@ -86,16 +86,7 @@ fn skips(bad: usize, reason: &str, damage: impl FnOnce(&Path)) {
     damage(&recording::images(recording.path())[bad]);
     let run = run_of(recording.path());
     run.finish().succeeded();
-    let summary = run.summary();
-    for (key, count) in [
-        ("published", 7),
-        ("processed", 7),
-        ("unreadable", 1),
-        ("dropped", 0),
-        ("breaks", 0),
-    ] {
-        assert_eq!(summary[key], count, "{key}");
-    }
+    run.assert_counts("published=7 processed=7 unreadable=1 dropped=0 breaks=0");
     let rows = odometry::rows(&run.odometry());
     odometry::assert_unbroken(&rows);
     assert_eq!(rows.len(), 6);

@@ -88,10 +88,7 @@ fn a_live_gyro_and_wheels_give_the_motions_of_their_logs_and_the_recording_repla
     for sensor in sensors {
         sensor.join().unwrap();
     }
-    assert_eq!(run.summary()["dropped"], 0);
-    for sensor in ["gyro", "wheels"] {
-        assert_eq!(run.summary()[sensor]["motions"], SCANS - 1);
-    }
+    run.assert_counts("dropped=0 gyro/motions=11 wheels/motions=11");
     assert!(live == expected, "{live}\n{expected}");
     assert_eq!(replay(&file(&run), &[]), expected);
 }

@@ -124,9 +124,7 @@ fn a_radar_gives_the_motions_of_its_recording() {
         let radar = Radar::playing(whole.path(), clock);
         let run = radar.run(scans);
         let live = run.complete();
-        assert_eq!(run.summary()["dropped"], 0);
-        let source = &run.summary()["stages"]["radar-replay"];
-        assert_eq!(source["missing_azimuths"], 0);
+        run.assert_counts("dropped=0 stages/radar-replay/missing_azimuths=0");
         assert!(live == recorded, "{clock:?}:\n{live}\n{recorded}");
     }
 }
@@ -164,10 +162,8 @@ fn datagrams_give_the_motions_of_the_recording() {
     let radar = Radar::sending(&group(1), whole.path(), &arguments);
     let run = radar.received(scans);
     let live = run.complete();
-    let source = &run.summary()["stages"]["radar-replay"];
-    assert_eq!(source["missing_azimuths"], 0, "{source}");
-    assert_eq!(source["damaged_messages"], 0, "{source}");
-    assert_eq!(run.summary()["dropped"], 0);
+    run.assert_counts("dropped=0 stages/radar-replay/missing_azimuths=0");
+    run.assert_counts("stages/radar-replay/damaged_messages=0");
     // On a busy machine the radar may have begun before the run.
     let all = Run::small().data(whole.path()).complete();
     let stamps = |csv| odometry::columns(csv, &["stamp_ns", "previous_scan"]);
@@ -205,9 +201,8 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
     running.await_poses(5).signal(Signal::INT);
     running.finish();
     run.complete();
-    let summary = run.summary();
-    assert_eq!(summary["published"], 20);
-    assert_eq!(summary["breaks"], 1, "nothing is known of the time between");
+    // Nothing is known of the time between.
+    run.assert_counts("published=20 breaks=1");
 }
 
 #[test]

@@ -4,7 +4,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
     thread,
     time::Duration,
 };
@@ -15,9 +14,9 @@ use serde_json::Value;
 
 use crate::{
     common::{
-        Ended, Run, finished, odometry, python,
+        Ended, Run, finished, odometry,
         recording::{SCANS, around_a_block},
-        send, undisturbed, with_tmpfs,
+        script, send, undisturbed, with_tmpfs,
     },
     operate::commands::{ask, await_status, process},
     reach::{only_if, python_has},
@@ -282,35 +281,14 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
     assert_eq!(run.odometry(), undisturbed());
 }
 
-/// Prints the objects of a recording, as the Python package `mcap` decodes them by their schema: of
-/// each box the time, the identity, the place and the length, and the number of arrows.
-const READ_OBJECTS: &str = "
-import json, sys
-from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
-boxes, arrows = [], 0
-with open(sys.argv[1], 'rb') as file:
-    for schema, channel, message, decoded in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
-        topics=['/objects']
-    ):
-        assert schema.name == 'foxglove.SceneUpdate', schema.name
-        entity, = decoded.entities
-        assert (entity.frame_id, entity.id) == ('odometry', 'objects')
-        arrows += len(entity.arrows)
-        for cube, text in zip(entity.cubes, entity.texts, strict=True):
-            place = cube.pose.position
-            boxes.append([message.log_time, int(text.text), place.x, place.y, cube.size.x])
-print(json.dumps({'boxes': boxes, 'arrows': arrows}))
-";
-
 #[test]
 fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
     only_if!(python_has("mcap_protobuf"));
     let run = Run::small().data(around_a_block()).set(WINDOW);
     let run = recorded(&run.set("objects.kind=tracks").rate("20"));
     run.complete();
-    let mut command = Command::new(python());
-    command.args(["-c", READ_OBJECTS]).arg(file(&run));
+    let mut command = script("observers/objects.py");
+    command.arg(file(&run));
     let ended = Ended::of(command);
     ended.succeeded();
     let read: Value = serde_json::from_str(&ended.stdout).unwrap();

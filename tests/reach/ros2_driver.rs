@@ -76,16 +76,12 @@ fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
         let _driver = Driver::playing(whole.path(), &domain, publishes, &[], &[]);
         let run = receiving(with_constants(Run::small()), &domain, topic, scans);
         let live = run.complete();
-        let source = &run.summary()["stages"]["radar-replay"];
-        for lost in [
-            "missing_azimuths",
-            "damaged_messages",
-            "scans_left_out",
-            "reconnections",
-        ] {
-            assert_eq!(source[lost], 0, "{publishes}: {lost}");
+        let losses = "missing_azimuths damaged_messages scans_left_out reconnections";
+        for lost in losses.split(' ') {
+            let key = format!("stages/radar-replay/{lost}");
+            assert_eq!(run.count(&key), 0, "{publishes}: {lost}");
         }
-        assert_eq!(run.summary()["dropped"], 0);
+        run.assert_counts("dropped=0");
         assert!(live == recorded, "{publishes}: {live}\n{recorded}");
     }
 }
@@ -113,8 +109,7 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
     let run = run.sets("gyro.kind=ros2 gyro.max_wait_ms=200 wheels.kind=ros2");
     let live = run.complete();
-    let summary = run.summary();
-    let used = ["gyro", "wheels"].map(|of| summary[of]["motions"].as_u64().unwrap_or(0) as usize);
+    let used = ["gyro", "wheels"].map(|of| run.count(&format!("{of}/motions")) as usize);
     assert!(used.iter().all(|used| *used > SCANS / 2));
     if used == [SCANS - 1; 2] {
         let recorded = Run::small().data(whole.path()).set("gyro.kind=auto");
