@@ -48,10 +48,7 @@ fn edited(file: &[u8], edits: &[Edit], word: impl Fn(&mut [u8], usize, usize, u6
 
 fn pose(seq: u64) -> PoseHeader {
     PoseHeader {
-        item: Item {
-            seq,
-            ..Item::default()
-        },
+        item: Item::numbered(seq),
         ..PoseHeader::default()
     }
 }

@@ -73,7 +73,7 @@ fn runs() {
     fs::write(&path, &recording).unwrap();
     use_run(&path).unwrap();
     let dataset = gyre_recording::open(&path, &DatasetOptions::default()).unwrap();
-    assert_eq!(dataset.len(), SCANS as usize);
+    assert_eq!(dataset.scans().count(), SCANS as usize);
     check!().with_type::<Vec<ByteEdit>>().for_each(|edits| {
         let mut file = recording.clone();
         edit_bytes(&mut file, edits);

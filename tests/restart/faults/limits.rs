@@ -75,10 +75,9 @@ fn limited(
     // A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack
     // cannot grow (SIGSEGV). For the supervisor that is as good as a kill.
     if resource == "as" && ended.code().is_none() {
-        scene.resumed(run);
+        scene.resumed(run)
     } else {
         assert_nothing_left(run.out());
-        scene.survived(run, &ended);
+        scene.survived(run, &ended)
     }
-    Some(())
 }

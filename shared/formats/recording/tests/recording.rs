@@ -17,18 +17,9 @@ use gyre_recording::{
     file::McapFile, open, open_recording,
 };
 use mcap::records::{MessageHeader, Metadata, Record, op};
-use written::{head, message};
+use written::{head, item, message};
 
 const SCANS: u64 = 6;
-
-fn item(seq: u64) -> Item {
-    Item {
-        scan: seq + 10,
-        previous_scan: seq + 10,
-        published: seq,
-        ..written::item(seq)
-    }
-}
 
 fn scan(seq: u64) -> Incoming {
     written::scan(item(seq))

@@ -52,18 +52,6 @@ proptest! {
 }
 
 #[test]
-fn a_sweep_is_complete_at_its_last_azimuth() {
-    for (encoder_size, first) in [(5600, 0), (5600, 13), (5595, 0), (5595, 8)] {
-        let radar = configuration(encoder_size, 4);
-        let mut assembly = Assembly::new(&radar);
-        for (k, row) in turns(&radar, first, START_NS, 3).iter().enumerate() {
-            let complete = assembly.add(&row.azimuth(ClockFormat::default()), row.stamp_ns);
-            assert_eq!(complete, k % 400 == 399, "{encoder_size} {first} {k}");
-        }
-    }
-}
-
-#[test]
 fn a_sweep_that_began_before_the_stream_is_discarded() {
     let radar = configuration(5600, 4);
     assert!(Assembly::new(&radar).assembler.is_first(0));

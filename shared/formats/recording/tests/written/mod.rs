@@ -8,11 +8,10 @@ use gyre_recording::{Head, Incoming};
 pub const START_NS: i64 = 1_549_986_607_000_000_000;
 
 pub fn item(seq: u64) -> Item {
+    let stamp_ns = START_NS + seq as i64 * 250_000_000;
     Item {
-        seq,
-        scan: seq,
-        stamp_ns: START_NS + seq as i64 * 250_000_000,
-        ..Item::default()
+        published: seq,
+        ..Item::recorded(seq, seq + 10, stamp_ns)
     }
 }
 
