@@ -37,7 +37,7 @@ pub use leftovers::{assert_nothing_left, assert_nothing_left_of};
 pub use other_user::OtherUser;
 pub use processes::{Pid, send};
 pub use running::{Running, poses_of};
-pub use server::Server;
+pub use server::{Server, asked};
 pub use shared::Shared;
 pub use spawned::Spawned;
 pub use watch::{Watch, Watched};
@@ -94,6 +94,20 @@ macro_rules! finished {
     }};
 }
 pub(crate) use finished;
+
+/// The paths of the files and folders in a folder, sorted; none where it is missing.
+pub fn entries_of(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    paths.sort();
+    paths
+}
+
+/// Their names.
+pub fn names_in(folder: &Path) -> Vec<String> {
+    let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+    entries_of(folder).iter().map(name).collect()
+}
 
 pub fn works(command: &[&str]) -> bool {
     let output = Command::new(command[0]).args(&command[1..]).output();
@@ -194,12 +208,7 @@ pub struct Run {
 impl Run {
     /// A run of the small recording, as fast as it goes.
     pub fn of_recording() -> Self {
-        Self::of_recording_named(recording::small().to_str().unwrap())
-    }
-
-    /// The same where the recording goes by another name.
-    pub fn of_recording_named(name: &str) -> Self {
-        Self::small().option(name)
+        Self::small().data(recording::small())
     }
 
     /// A run of small rasters whose recording is still to be named.

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 /// A whole recording, and a run of it at a rate.
 fn whole(rate: &str) -> (TempDir, Run) {
     let recording = recording::copy(recording::SCANS);
-    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    let run = Run::small().data(recording.path());
     (recording, run.rate(rate))
 }
 
@@ -144,7 +144,7 @@ fn damaged(scans: impl IntoIterator<Item = usize>) -> (TempDir, Run) {
     for scan in scans {
         recording::truncate(&images[scan], 100_000);
     }
-    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    let run = Run::small().data(recording.path());
     (recording, run)
 }
 

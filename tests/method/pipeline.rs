@@ -97,7 +97,7 @@ fn data_in_a_folder_with_any_name_are_played() {
     for name in ["2019-01-10", "1e5", "true", "it's a \"drive\""] {
         let link = run.folder().join(name);
         std::os::unix::fs::symlink(recording::small(), &link).unwrap();
-        let named = Run::of_recording_named(name);
+        let named = Run::small().option(name);
         let mut command = named.command();
         command.current_dir(run.folder());
         named.start_as(command).finish().succeeded();

@@ -12,7 +12,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    common::{Ended, Run, Running, Server, odometry, recording, script},
+    common::{Ended, Run, Running, Server, asked, odometry, recording, script},
     reach::{only_if, python_has},
 };
 
@@ -112,14 +112,15 @@ fn powers(path: &std::path::Path) -> Value {
 fn connect(url: &str, query: &str, headers: &[&str]) -> (TcpStream, String) {
     let (address, _) = url.strip_prefix("ws://").unwrap().split_once('/').unwrap();
     let (_, port) = address.rsplit_once(':').unwrap();
-    let mut stream = TcpStream::connect(("127.0.0.1", port.parse().unwrap())).unwrap();
-    let headers = headers.iter().map(|header| format!("{header}\r\n"));
-    let headers: String = headers.collect();
-    let request = format!(
-        "GET /{query} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n{headers}\r\n"
-    );
-    stream.write_all(request.as_bytes()).unwrap();
+    let host = format!("Host: 127.0.0.1:{port}");
+    let upgrade = [
+        &host,
+        "Connection: Upgrade",
+        "Upgrade: websocket",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+    ];
+    let stream = asked(port, &format!("/{query}"), &[&upgrade, headers].concat());
     let mut answer = String::new();
     let mut reader = BufReader::new(stream.try_clone().unwrap());
     reader.read_line(&mut answer).unwrap();

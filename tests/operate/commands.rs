@@ -150,7 +150,7 @@ fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
     ask(&run, &["down"]).succeeded();
     assert_nothing_left(run.out());
     assert!(!ask(&run, &["down"]).status.success());
-    let nowhere = Run::of_recording_named("/nowhere");
+    let nowhere = Run::small().option("/nowhere");
     Ended::of(up(&nowhere)).refused_with(&["/nowhere"]);
     assert!(run.result("log/gyre.txt").contains("interrupted"));
     assert_eq!(run.complete(), undisturbed());
@@ -218,7 +218,7 @@ fn logs_of_a_run_are_lines_of_the_process_that_is_asked_for() {
     let copy = recording::copy(8);
     let images = recording::images(copy.path());
     recording::truncate(&images[3], 1000);
-    let run = Run::of_recording_named(copy.path().to_str().unwrap());
+    let run = Run::small().data(copy.path());
     run.finish();
     ask(&run, &["logs", "radar-replay"])
         .succeeded()

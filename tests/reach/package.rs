@@ -9,7 +9,10 @@ use std::{
 
 use toml::{Table, Value};
 
-use crate::{PROJECT, common::gyre};
+use crate::{
+    PROJECT,
+    common::{entries_of, gyre},
+};
 
 /// The text of a file of the project.
 fn read(path: &str) -> String {
@@ -34,8 +37,7 @@ fn files(pattern: &str) -> Vec<PathBuf> {
     let Some((begin, end)) = name.split_once('*') else {
         return path.is_file().then_some(path).into_iter().collect();
     };
-    let entries = fs::read_dir(path.parent().unwrap()).unwrap();
-    let files = entries.map(|entry| entry.unwrap().path());
+    let files = entries_of(path.parent().unwrap()).into_iter();
     files
         .filter(|file| {
             let name = file.file_name().unwrap().to_str().unwrap();

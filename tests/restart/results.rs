@@ -5,7 +5,7 @@ use std::{fs, os::unix::fs::symlink, path::Path};
 
 use crate::{
     common::{
-        Ended, Run, finished,
+        Ended, Run, finished, names_in,
         recording::{self, MIDDLE, MODERATE},
         undisturbed, with_mount,
     },
@@ -16,13 +16,6 @@ pub fn interrupted() -> Run {
     let run = Run::of_recording();
     run.interrupt(MODERATE, MIDDLE);
     run
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    entries
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect()
 }
 
 /// The results could not be written at the first attempt: an earlier summary does not make the run
@@ -174,7 +167,7 @@ fn an_empty_or_missing_config_is_restored_and_the_run_resumes() {
         damage(&config).unwrap();
         assert_eq!(run.complete(), undisturbed());
         for folder in [run.out().to_owned(), run.out().join("journal")] {
-            let names = names(&folder);
+            let names = names_in(&folder);
             let has_draft = names.iter().any(|name| name.ends_with(".tmp"));
             assert!(!has_draft, "{names:?}");
         }
@@ -297,7 +290,7 @@ fn a_file_that_gyre_did_not_write_into_a_recording_is_never_removed() {
     let other = run.clone().set("simulation.seed=4").option("--fresh");
     other.finish().failed_with(&["recording", "notes.txt"]);
     assert_eq!(fs::read(&notes).unwrap(), b"rain");
-    assert_eq!(names(&run.out().join("recording/radar")).len(), 6);
+    assert_eq!(names_in(&run.out().join("recording/radar")).len(), 6);
     fs::remove_file(&notes).unwrap();
     other.complete();
 }
@@ -306,11 +299,11 @@ fn a_file_that_gyre_did_not_write_into_a_recording_is_never_removed() {
 fn a_recording_is_not_replaced_while_the_run_that_plays_it_is_unfinished() {
     let run = stored();
     run.interrupt("2", 2);
-    let images = names(&run.out().join("recording/radar"));
+    let images = names_in(&run.out().join("recording/radar"));
     let other = run.clone().set("simulation.seed=4");
     other
         .finish()
         .refused_with(&["another configuration", "simulation.seed"]);
-    assert_eq!(names(&run.out().join("recording/radar")), images);
+    assert_eq!(names_in(&run.out().join("recording/radar")), images);
     assert_eq!(run.complete(), stored().complete());
 }
