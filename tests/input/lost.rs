@@ -64,9 +64,7 @@ fn a_source_that_waits_for_its_input_has_not_stalled() {
     take_away(recording.path());
     thread::sleep(Duration::from_secs(4));
     bring_back(recording.path());
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(!ended.stderr.contains("restarted"), "{}", ended.stderr);
+    running.finish().succeeded().does_not_say("restarted");
     assert_whole(&run);
 }
 

@@ -2,10 +2,9 @@
 //! live.
 
 use std::{
-    io::{BufRead, BufReader, Read},
     net::{TcpListener, UdpSocket},
     path::Path,
-    process::{self, Child, Stdio},
+    process,
     sync::mpsc::{self, RecvTimeoutError},
     thread,
     time::Duration,
@@ -15,7 +14,7 @@ use rustix::process::Signal;
 use tempfile::TempDir;
 
 use crate::{
-    common::{Ended, Run, Watch, gyre, odometry, recording},
+    common::{Ended, Run, Spawned, Watch, gyre, odometry, recording},
     operate::commands::ask,
 };
 
@@ -24,8 +23,9 @@ const RATE: &str = "1.5";
 
 /// A radar on a port of its own, which is switched off when it is dropped.
 pub(crate) struct Radar {
-    server: Child,
+    server: Spawned,
     pub address: String,
+    _folder: TempDir,
 }
 
 impl Radar {
@@ -46,13 +46,17 @@ impl Radar {
             command.args(["--rate", RATE]);
         }
         command.arg(recording).args(arguments);
-        command.stderr(Stdio::piped()).stdout(Stdio::piped());
-        let mut server = command.spawn().unwrap();
-        let mut said = String::new();
-        let mut words = BufReader::new(server.stderr.take().unwrap());
-        words.read_line(&mut said).unwrap();
-        let address = said.trim().rsplit(' ').next().unwrap().to_owned();
-        Self { server, address }
+        let folder = TempDir::new().unwrap();
+        let server = Spawned::new(command, folder.path().join("said"));
+        let address = server.until(|said| {
+            let (line, _) = said.split_once('\n')?;
+            line.rsplit(' ').next().map(str::to_owned)
+        });
+        Self {
+            server,
+            address,
+            _folder: folder,
+        }
     }
 
     pub fn run(&self, scans: usize) -> Run {
@@ -61,10 +65,10 @@ impl Radar {
 
     /// Waits until the radar has played all, and returns its report of played and lost azimuths.
     pub fn played(&mut self) -> Played {
-        let mut said = String::new();
-        let mut words = self.server.stdout.take().unwrap();
-        words.read_to_string(&mut said).unwrap();
-        let numbers = said.split(|c: char| !c.is_ascii_digit());
+        self.server.wait();
+        let said = self.server.said();
+        let report = said.lines().last().unwrap();
+        let numbers = report.split(|c: char| !c.is_ascii_digit());
         let mut numbers = numbers.filter_map(|number| number.parse().ok());
         let mut next = || numbers.next().unwrap_or_else(|| panic!("{said}"));
         Played {
@@ -106,13 +110,6 @@ pub(crate) fn complete(drive: TempDir) -> TempDir {
     let images = recording::images(drive.path());
     images.iter().for_each(|image| recording::complete(image));
     drive
-}
-
-impl Drop for Radar {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
 }
 
 #[test]

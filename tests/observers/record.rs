@@ -148,8 +148,7 @@ fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
     let missed = SCANS - there.len();
     assert!(missed >= 4, "{there:?}");
     assert_eq!(recording.missed()["scan"], missed as u64);
-    let (said, missing) = (&ended.stderr, format!("missed {missed} scan"));
-    assert!(said.contains(&missing), "{said}");
+    ended.says(&format!("missed {missed} scan"));
     missed
 }
 
@@ -165,9 +164,8 @@ fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_count
     send(killed, Signal::KILL);
     running.await_child("record", Some(killed));
     let ended = running.finish();
-    ended.succeeded();
+    ended.succeeded().does_not_say("missed nothing");
     counted_as_missed(&run, &ended);
-    assert!(!ended.stderr.contains("missed nothing"), "{}", ended.stderr);
 }
 
 #[test]
@@ -208,8 +206,8 @@ fn the_recorder_is_listed_with_the_health_that_it_records_and_started_again_on_r
     };
     let first = recorder("a heartbeat", &|it| it["activity"] == "waiting");
     assert!(first["restarts"] == 0 && first["missed"] == 0, "{first}");
-    assert!(ask(&run, &["ps"]).stdout.contains("\n  recorder "));
-    assert!(ask(&run, &["top", "--once"]).stdout.contains("\nrecorder "));
+    ask(&run, &["ps"]).prints("\n  recorder ");
+    ask(&run, &["top", "--once"]).prints("\nrecorder ");
     ask(&run, &["restart", "recorder"]).succeeded();
     let second = recorder("a restart", &|it| it["activity"] == "waiting");
     assert_ne!(first["pid"], second["pid"]);
@@ -274,10 +272,8 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
         return;
     };
     let ended = recorded.start_as(command).finish();
-    ended.succeeded();
-    for part in ["No space left", "the run continues"] {
-        ended.says(part);
-    }
+    ended.succeeded().says("No space left");
+    ended.says("the run continues");
     assert_eq!(run.odometry(), undisturbed());
 }
 

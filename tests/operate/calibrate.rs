@@ -145,13 +145,12 @@ fn the_clock_and_the_axis_of_a_gyro_are_found_and_a_run_takes_them() {
     let Some(recording) = turning() else { return };
     let (recording, out) = (recording.path(), TempDir::new().unwrap());
     let ended = calibrate(recording, out.path(), &[], &["radiate"]);
-    let said = ended.succeeded().stdout.clone();
-    assert!(said.contains("gyro, axis up         -z\n"), "{said}");
+    ended.succeeded().prints("gyro, axis up         -z\n");
     let file = out.path().join("calibration.toml");
     let table: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
     let gyro = table["gyro"].as_table().unwrap();
     let delay_s = gyro["delay_s"].as_float().unwrap();
-    assert!((delay_s - 1.58).abs() < 0.06, "{said}");
+    assert!((delay_s - 1.58).abs() < 0.06, "{ended:?}");
     assert_eq!(gyro["kind"].as_str(), Some("auto"));
     let used: toml::Table = configuration_with(&file, recording).parse().unwrap();
     assert_eq!(used["gyro"]["delay_s"].as_float(), Some(delay_s));

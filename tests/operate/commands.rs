@@ -258,7 +258,7 @@ fn top_shows_the_processes_of_a_run_in_a_terminal() {
         thread::sleep(Duration::from_millis(50));
     }
     let text = ask(&run, &["top", "--once", "--every", "0.2"]);
-    assert!(text.succeeded().stdout.contains("rotation-search"));
+    text.succeeded().prints("rotation-search");
     assert_eq!(running.complete(), undisturbed());
 }
 

@@ -158,8 +158,7 @@ fn objects_are_evaluated_against_the_truth_of_their_recording() {
     let run = Run::small().data(data).set("objects.kind=tracks");
     run.complete();
     let against = |truth: &Path| finished!["evaluate", "--objects", run.out(), truth];
-    let printed = against(data);
-    assert!(printed.succeeded().stdout.contains("precision"));
+    against(data).succeeded().prints("precision");
     let empty = tempfile::tempdir().unwrap();
     fs::write(empty.path().join("objects.csv"), "").unwrap();
     against(empty.path()).failed_with(&["ground_truth.tum"]);

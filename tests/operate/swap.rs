@@ -87,8 +87,7 @@ fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
         assert_eq!(back["last_death"], Value::Null, "it was of another program");
     }
     ask(&run, &["down"]).succeeded();
-    let ended = running.end();
-    assert!(ended.stderr.contains("goes back to the program before"));
+    running.end().says("goes back to the program before");
     let rest = Run::of_recording().into(run.out());
     assert_eq!(rest.complete(), undisturbed());
 }

@@ -82,7 +82,7 @@ fn a_live_run_that_cannot_continue_the_earlier_one_keeps_it_under_a_number() {
         let kept = out.with_extension((number + 1).to_string());
         let ended = run.finish();
         let words = format!("is kept as {}", kept.display());
-        assert!(ended.succeeded().stderr.contains(&words), "{ended:?}");
+        ended.succeeded().says(&words);
         let kept = fs::read_to_string(kept.join("odometry.csv")).unwrap();
         assert_eq!(kept, odometry);
     }
