@@ -1,4 +1,6 @@
-"""Subscribes to all channels of a server of Foxglove by the package websockets, decodes the messages by their schemas, and prints them after so many poses and a message of each channel of the run.
+"""Subscribes to all channels of a server of Foxglove by the package websockets, decodes the
+messages by their schemas, and prints them after so many poses and a message of each channel of the
+run.
 
 usage: foxglove.py URL POSES
 """

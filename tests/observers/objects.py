@@ -1,4 +1,5 @@
-"""Prints the objects of a recording, as the package mcap decodes them by their schema: of each box the time, the identity, the place and the length, and the number of arrows.
+"""Prints the objects of a recording, as the package mcap decodes them by their schema: of each box
+the time, the identity, the place and the length, and the number of arrows.
 
 usage: objects.py RECORDING
 """
