@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, write_azimuth};
+use gyre_colossus::{Azimuth, ByteOrder, ClockFormat, Configuration, Powers, write_azimuth};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::Dataset;
 use gyre_geometry::{OwnedScan, PolarScan, SweepGeometry, scan::flag};
@@ -248,9 +248,13 @@ impl<'a> Player<'a> {
         let turns = f64::from(scan.azimuth_rad[row]) / TAU;
         let encoder = (turns * f64::from(encoder_size)).round() as u16 % encoder_size;
         let stamp_ns = scan.stamp_ns[row] + self.shift_ns;
+        let (seconds, split_seconds) = self.clock.fields(stamp_ns);
         let azimuth = Azimuth {
             sweep_counter: self.sweep_counter,
-            ..Azimuth::at(encoder, stamp_ns, self.clock, scan.row(row))
+            encoder,
+            seconds,
+            split_seconds,
+            powers: Powers::Eight(scan.row(row)),
         };
         if row == GARBLED && is_nth(self.played.scans, faults.garbage_every) {
             self.output.send(GARBAGE);
