@@ -143,7 +143,7 @@ impl Recorded {
         arguments: &CalibrateArguments,
     ) -> Result<Self, Failure> {
         let sensors = Sensor::read_all(&configuration, arguments)?;
-        sensors::leave_out(&mut configuration.odometry);
+        sensors::leave_out(&mut configuration.odometry.sensors);
         let configuration = &configuration;
         let (drive, geometry) = read(configuration, arguments)?;
         let dataset = with_stored_options(configuration)?.dataset;

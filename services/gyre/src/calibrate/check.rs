@@ -13,7 +13,7 @@ use super::{CalibrateArguments, sensors};
 /// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.
 pub(super) fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f64; 2]> {
     let mut configuration = arguments.inputs.configuration().ok()?;
-    sensors::leave_out(&mut configuration.odometry);
+    sensors::leave_out(&mut configuration.odometry.sensors);
     let truth = read_trajectory(&truth_of(&configuration, &arguments.out)?).ok()?;
     let before = ate_m(&configuration, arguments.scans, &truth).ok()?;
     let file: ::toml::Table = toml(found).parse().ok()?;
