@@ -271,6 +271,7 @@ mod tests {
                     scale_sigma: 0.25,
                     bias: 0.5,
                     bias_sigma: 0.125,
+                    ..WitnessRecord::default()
                 };
             }
             counter.add(&pose);
