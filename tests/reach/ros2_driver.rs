@@ -10,7 +10,7 @@ use crate::{
     common::{Run, odometry, recording, recording::with_constants},
     live::{
         gnss,
-        gyro::{SCANS, address, with_log},
+        gyro::{SCANS, with_log},
         radar::{Radar, whole},
     },
     observers::record::recorded,
@@ -127,8 +127,7 @@ fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
     let domain = domain(11);
     let _driver = Driver::playing(drive.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, gnss::SCANS);
-    let run = recorded(&gnss::with_graph(run, &address(6)));
-    let run = run.sets("gnss.kind=ros2 gnss.topic='/fix'");
+    let run = recorded(&gnss::with_graph(run)).sets("gnss.kind=ros2 gnss.topic='/fix'");
     run.complete();
     let gnss = run.summary()["gnss"].clone();
     let fixes = gnss["fixes"].as_u64().unwrap() as usize;

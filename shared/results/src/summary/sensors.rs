@@ -2,11 +2,12 @@
 
 use std::collections::VecDeque;
 
-use gyre_calibration::{Compared, delay};
+use gyre_calibration::{Compared, compare};
 use gyre_configuration::Configuration;
 use gyre_contract::{
     Measures, PoseHeader, Witness, WitnessRecord, flag, initial_guess, outcome, verdict,
 };
+use gyre_geometry::samples::SensorConfig;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{Counts, GnssSummary};
@@ -16,9 +17,9 @@ use super::{Counts, GnssSummary};
 const MAX_DOUBTED_SHARE: f64 = 0.1;
 const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
-/// A delay of more than so many standard deviations is one.
-const DELAY_SIGMAS: f64 = 4.0;
-/// The delay is measured over so many motions: an hour.
+/// A delay or a scale that is off by more than so many standard deviations is wrong.
+const SIGMAS: f64 = 4.0;
+/// Delay and scale are measured over so many motions: an hour.
 const MOTIONS_OF_DELAY: usize = 1 << 14;
 
 /// The part of a kind of sensor in the motions of a run.
@@ -35,8 +36,9 @@ pub struct SensorCount {
     pub predicted: u64,
     /// Scale and bias after the last of these motions.
     pub last: WitnessRecord,
-    /// Delay of its stamps and its standard deviation, s; `None`: it is unknown.
-    pub delay_s: Option<[f64; 2]>,
+    /// The delay of its stamps, s, and its scale against the radar over the whole run, each with its
+    /// standard deviation; `None`: they are unknown.
+    pub delay_and_scale: Option<[[f64; 2]; 2]>,
 }
 
 /// Of each kind; `None`: it has measured nothing.
@@ -87,7 +89,10 @@ impl Serialize for Named<'_> {
             }
         }
         if row.samples.is_some() {
-            map.serialize_entry("delay_s", &count.delay_s)?;
+            map.serialize_entry(
+                "delay_s",
+                &count.delay_and_scale.map(|[delay_s, _]| delay_s),
+            )?;
         }
         map.end()
     }
@@ -130,9 +135,11 @@ impl SensorCounter {
         let mut clocks = self.clocks.into_iter();
         let all = Witness::ALL.map(|kind| {
             let has_bias = kind.row().measures == Measures::Turn;
-            let delay_s = clocks.next().and_then(|clock| clock.delay_s(has_bias));
+            let delay_and_scale = clocks
+                .next()
+                .and_then(|clock| clock.delay_and_scale(has_bias));
             let count = SensorCount {
-                delay_s,
+                delay_and_scale,
                 ..self.counts[kind as usize]
             };
             (count.motions > 0).then_some(count)
@@ -141,7 +148,7 @@ impl SensorCounter {
     }
 }
 
-/// The motions by the radar alone and by a sensor, to measure the delay between them.
+/// The motions by the radar alone and by a sensor, to measure the delay and the scale between them.
 #[derive(Debug, Default)]
 pub struct Clock(VecDeque<Compared>);
 
@@ -165,10 +172,11 @@ impl Clock {
         });
     }
 
-    /// Returns the delay and its standard deviation, s; `None` where it is not determined.
-    pub fn delay_s(mut self, has_bias: bool) -> Option<[f64; 2]> {
-        let delay = delay(self.0.make_contiguous(), has_bias)?;
-        Some([delay.value, delay.sigma])
+    /// Returns the delay, s, and the scale, each with its standard deviation; `None` where they are
+    /// not determined.
+    pub fn delay_and_scale(mut self, has_bias: bool) -> Option<[[f64; 2]; 2]> {
+        let both = compare(self.0.make_contiguous(), has_bias)?;
+        Some(both.map(|estimate| [estimate.value, estimate.sigma]))
     }
 }
 
@@ -203,7 +211,7 @@ pub fn problem(
             Measures::Heading => too_many(contradictions, it.motions, MAX_DOUBTED_SHARE),
         };
         let section = kind.name();
-        let cause = cause(kind, sensors.of(kind)?.delay_s(), it.delay_s, is_wrong)?;
+        let cause = cause(kind, sensors.of(kind)?, it.delay_and_scale, is_wrong)?;
         let motions = it.motions;
         Some(match kind.row().measures {
             Measures::Turn => format!(
@@ -224,17 +232,30 @@ pub fn problem(
     sampled().find_map(contradicted).or_else(by_gnss)
 }
 
-/// Returns which key of a sensor is wrong: by a delay, if that is certain.
-fn cause(kind: Witness, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
+/// Returns which key of a sensor is wrong: the delay or the scale, if one of them is certain.
+fn cause(
+    kind: Witness,
+    config: &dyn SensorConfig,
+    measured: Option<[[f64; 2]; 2]>,
+    is_wrong: bool,
+) -> Option<String> {
     let section = kind.name();
     let up = match kind.row().measures {
         Measures::Turn => "`gyro.up`, ",
         Measures::Distance | Measures::Heading => "",
     };
+    let is_late = |[delay_s, sigma_s]: [f64; 2]| delay_s.abs() > SIGMAS * sigma_s;
+    let (set_scale, max_error) = config.scale();
+    let is_scaled =
+        |[scale, sigma]: [f64; 2]| (scale - 1.0).abs() > max_error.hypot(SIGMAS * sigma);
     match measured {
-        Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
+        Some([[delay_s, sigma_s], _]) if is_late([delay_s, sigma_s]) => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
-            set_s + delay_s
+            config.delay_s() + delay_s
+        )),
+        Some([_, [scale, sigma]]) if is_scaled([scale, sigma]) => Some(format!(
+            "the true values are {scale:.3} \u{b1} {sigma:.3} times the measured ones: set {section}.scale={:.3}, which `gyre calibrate` finds too",
+            set_scale * scale
         )),
         _ if is_wrong && kind.row().measures == Measures::Heading => Some(format!(
             "it turns the other way, is of another drive, or `{section}.delay_s` or `{section}.noise_deg` is wrong"

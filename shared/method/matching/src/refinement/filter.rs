@@ -10,7 +10,7 @@
 
 use gyre_geometry::{
     Pose,
-    samples::{Evidence, GyroConfig, SensorConfigs, Witness},
+    samples::{Evidence, GyroConfig, SensorConfig, SensorConfigs, Witness},
     wrap_angle,
 };
 use nalgebra::{Matrix6, RowVector6, Vector6};
@@ -28,8 +28,6 @@ const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 /// Random walk of the scale of wheels and Doppler, /√s: tyres that warm change it by 0.06 % in an
 /// hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
-/// Least standard deviation of such a scale around 1: the settings may be for other tyres.
-const TYRES: f64 = 0.02;
 /// Standard deviation of the delay of a sensor with stamps of its own, s, beyond the configured
 /// delay.
 const DELAY_S: f64 = 0.05;
@@ -104,21 +102,22 @@ pub(super) struct SharedErrors {
 impl SharedErrors {
     /// Returns the errors of each kind, in the order of [`Witness::ALL`].
     pub fn of(configs: &SensorConfigs) -> [Self; Witness::ALL.len()] {
-        let of_scale = |scale_sigma: f64, delay_sigma_s: f64| Self {
+        let of_distance = |scale_sigma: f64, max_scale_error: f64, delay_sigma_s: f64| Self {
             bias: 0.0,
             bias_sigma: 0.0,
             bias_walk_per_sqrt_s: 0.0,
             scale_sigma,
             scale_walk_per_sqrt_s: SCALE_WALK_PER_SQRT_S,
-            max_scale_error: 4.0 * scale_sigma.max(TYRES),
+            max_scale_error,
             delay_sigma_s,
             noise_per_sqrt_s: 0.0,
         };
+        let (wheels, doppler) = (&configs.wheels, configs.doppler.scale_sigma);
         Witness::ALL.map(|kind| match kind {
             Witness::Gyro => Self::of_gyro(&configs.gyro),
-            Witness::Wheels => of_scale(configs.wheels.scale_sigma, DELAY_S),
+            Witness::Wheels => of_distance(wheels.scale_sigma, wheels.scale().1, DELAY_S),
             // An absolute heading has no filter of its own.
-            _ => of_scale(configs.doppler.scale_sigma, 0.0),
+            _ => of_distance(doppler, 4.0 * doppler, 0.0),
         })
     }
 
