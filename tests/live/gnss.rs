@@ -33,7 +33,7 @@ fn receiving(radar: &Radar, address: &str, scans: usize) -> Run {
 
 /// A run whose trajectory is corrected by fixes.
 pub fn with_graph(run: Run) -> Run {
-    with_antenna(run.set("slam.kind=graph").set("run.window=32"))
+    with_antenna(run.sets("slam.kind=graph run.window=32"))
 }
 
 /// The messages that the receiver sends during the drive.

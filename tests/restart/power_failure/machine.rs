@@ -226,14 +226,12 @@ impl Stages {
 }
 
 fn item(seq: u64) -> Item {
+    let stamp_ns = 1_700_000_000_000_000_000 + seq as i64 * INTERVAL_NS;
     Item {
-        seq,
-        scan: seq,
         published: seq,
         previous_scan: seq.saturating_sub(1),
-        stamp_ns: 1_700_000_000_000_000_000 + seq as i64 * INTERVAL_NS,
         flags: if seq == 0 { flag::BREAK } else { 0 },
-        ..Item::default()
+        ..Item::recorded(seq, seq, stamp_ns)
     }
 }
 

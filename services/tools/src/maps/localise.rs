@@ -214,10 +214,7 @@ fn status_name(status: Status) -> &'static str {
 
 fn draw(map: &Path, path: &Found, out: &Path) -> Result<(), Failure> {
     let mut text = Vec::new();
-    let trajectory = Trajectory {
-        stamp_ns: Some(path.stamps_ns.clone()),
-        poses: path.pieces.concat(),
-    };
+    let trajectory = Trajectory::timed(path.stamps_ns.clone(), path.pieces.concat());
     write_tum(&trajectory, &mut text)
         .map_err(|error| format!("cannot write the fixes: {error}"))?;
     storage::write(&out.join(TUM), text)?;

@@ -218,25 +218,20 @@ mod tests {
 
     use clap::ValueEnum;
     use gyre_datasets::ground_truth::write_tum_pose;
-    use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
+    use gyre_geometry::{SparsePoint, UncertainMotion, pose};
     use gyre_slam::{RecordLog, localisation, mapping::Map};
 
     use super::*;
 
     fn keyframe(seq: u64) -> Keyframe {
+        let pose = UncertainMotion {
+            motion: pose(2.0 * seq as f64, 0.0, 0.0),
+            ..UncertainMotion::identity()
+        };
+        let points = vec![SparsePoint::from([20.0, 5.0, 0.0, 1.0, 0.0])];
         Keyframe {
-            seq,
-            scan: seq,
             stamp_ns: 1_000_000_000 * (seq as i64 + 1),
-            pose: UncertainMotion {
-                motion: pose(2.0 * seq as f64, 0.0, 0.0),
-                ..UncertainMotion::identity()
-            },
-            motion: UncertainMotion::identity(),
-            noise: nalgebra::Matrix3::zeros(),
-            twist: Twist::default(),
-            path_m: 0.0,
-            points: vec![SparsePoint::from([20.0, 5.0, 0.0, 1.0, 0.0])],
+            ..Keyframe::standing(seq, pose, points)
         }
     }
 

@@ -2,7 +2,7 @@ use std::{f64::consts::TAU, iter::successors};
 
 use gyre_contract::{Gnss, GnssHeader};
 use gyre_geometry::{
-    Pose, Twist, UncertainMotion, pose,
+    Pose, UncertainMotion, pose,
     samples::{GnssFix, Sample},
 };
 use gyre_recording::received_fixes;
@@ -27,16 +27,13 @@ fn keyframe(index: usize) -> Keyframe {
     let motion = uncertain(3.0, 0.0, TAU / 40.0 - 0.0005);
     let poses = successors(Some(pose(0.0, 0.0, 0.0)), |at| Some(at * motion.motion));
     let [x_m, y_m, yaw_rad] = poses.skip(index).map(|at| xy_yaw(&at)).next().unwrap();
+    let pose = uncertain(x_m, y_m, yaw_rad);
     Keyframe {
-        seq: 2 * index as u64,
         scan: 5 * index as u64,
         stamp_ns: 7 * index as i64,
-        pose: uncertain(x_m, y_m, yaw_rad),
         motion,
-        noise: Matrix3::zeros(),
-        twist: Twist::default(),
         path_m: 3.0 * index as f64,
-        points: Vec::new(),
+        ..Keyframe::standing(2 * index as u64, pose, Vec::new())
     }
 }
 
