@@ -6,7 +6,6 @@ mod sensors;
 
 use std::{
     path::{Path, PathBuf},
-    process::ExitCode,
     time::Instant,
 };
 
@@ -62,7 +61,7 @@ const SECTION: &str = "calibration.toml";
 const PICTURE: &str = "calibration.svg";
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
-pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
+pub fn calibrate(arguments: &CalibrateArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);
     let _locked = Out::lock_for(&arguments.out, Content::CALIBRATION)?;
@@ -86,7 +85,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
             print::note(format_args!("the radar is not calibrated: {error}"));
             format!("# Found by gyre calibrate. The radar is not calibrated: {error}\n")
         }
-        Err(_) => return radar.map(|_| ExitCode::SUCCESS),
+        Err(_) => return radar.map(drop),
     };
     storage::write(&file, text + &sensors.text)?;
     let (seconds, file) = (started.elapsed().as_secs_f64(), file.display());
@@ -99,7 +98,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         print::line(format_args!("{:<21} {check}", "check"))?;
         print::line(found.overlap())?;
     }
-    sensors.refused.map_or(Ok(ExitCode::SUCCESS), Err)
+    sensors.refused.map_or(Ok(()), Err)
 }
 
 fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {

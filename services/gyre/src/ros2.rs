@@ -1,6 +1,6 @@
 //! ROS 2: `gyre ros2`, and a radar behind Navtech's driver as a source.
 
-use std::{path::Path, process::ExitCode};
+use std::path::Path;
 
 use gyre_client::Run;
 use gyre_configuration::{
@@ -18,7 +18,7 @@ use gyre_transport::{RunError, wake::Signals};
 
 use crate::arguments::Ros2Arguments;
 
-pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
+pub fn publish(arguments: &Ros2Arguments) -> Result<(), Failure> {
     // A wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
@@ -47,7 +47,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     bridge.publish(&signals, |sentence| {
         print::note(format_args!("gyre: {sentence}"));
     })?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn map_settings(out: &Path) -> Result<MapSettings, String> {

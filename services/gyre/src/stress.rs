@@ -75,11 +75,6 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
-    gyre_tools::stress::helper::help(arguments)?;
-    Ok(ExitCode::SUCCESS)
-}
-
 fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let out = Out::lock_for(&arguments.out, Content::STRESS)?;
     let mut configuration = resolve(&RunArguments {

@@ -6,7 +6,7 @@ mod repaired;
 mod scans;
 mod source;
 
-use std::{path::Path, process::ExitCode};
+use std::path::Path;
 
 use gyre_configuration::terminal::{Failure, print};
 use gyre_recording::bags::{BagWriter, Kept, Topic};
@@ -19,14 +19,13 @@ pub use arguments::{ExportArguments, FrameArguments, ScanForm};
 use scans::ScanWriter;
 use source::{Place, Source};
 
-pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
+pub fn export(arguments: &ExportArguments) -> Result<(), Failure> {
     let mut source = Source::open(&arguments.source)?;
     match (&arguments.mcap, &arguments.out) {
-        (Some(bag), _) => write_bag(&mut source, bag, arguments)?,
-        (None, Some(out)) => repaired::write(&source, out)?,
-        (None, None) => return Err("name what to write: --mcap BAG".into()),
+        (Some(bag), _) => write_bag(&mut source, bag, arguments),
+        (None, Some(out)) => repaired::write(&source, out),
+        (None, None) => Err("name what to write: --mcap BAG".into()),
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> Result<(), Failure> {

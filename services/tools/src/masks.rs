@@ -5,7 +5,7 @@ mod inspection;
 mod inspector;
 pub mod picture;
 
-use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use clap::Args;
 use drawing::Canvas;
@@ -39,7 +39,7 @@ pub struct MasksArguments {
     pub json: bool,
 }
 
-pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
+pub fn masks(arguments: &MasksArguments) -> Result<(), Failure> {
     let configuration = arguments.inputs.configuration()?;
     let played = gyre_configuration::open(&configuration)?;
     let chosen = choose(
@@ -81,7 +81,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     if arguments.json {
         print::line(serde_json::to_string_pretty(&figures)?)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn choose(

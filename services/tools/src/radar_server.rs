@@ -3,7 +3,7 @@
 mod arguments;
 mod server;
 
-use std::{process::ExitCode, time::Duration};
+use std::time::Duration;
 
 use gyre_client::Signals;
 use gyre_configuration::{
@@ -15,7 +15,7 @@ pub use arguments::RadarServerArguments;
 pub(crate) use server::configuration;
 
 /// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
-pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
+pub fn serve(arguments: &RadarServerArguments) -> Result<(), Failure> {
     let mut configuration = played(&arguments.inputs)?;
     // The angles of an encoder are sent as it counts them: who receives them corrects its
     // eccentricity.
@@ -36,8 +36,7 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let (resets, stalls) = (played.resets, played.stalls);
     print::line(format_args!(
         "played {scans} scans, lost {azimuths} azimuths and {datagrams} datagrams, reset the connections {resets} times, stalled {stalls} times"
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    ))
 }
 
 /// Returns the configuration whose scans are played. A recording is sent as it is: without a

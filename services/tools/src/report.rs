@@ -7,7 +7,7 @@ mod subject;
 
 use std::{
     path::{Path, PathBuf},
-    process::{Command, ExitCode, Stdio},
+    process::{Command, Stdio},
 };
 
 use clap::Args;
@@ -36,7 +36,7 @@ pub struct ReportArguments {
     pub open: bool,
 }
 
-pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
+pub fn report(arguments: &ReportArguments) -> Result<(), Failure> {
     let truth = match &arguments.ground_truth {
         Some(truth) => Some(truth.clone()),
         None => truth_of(&arguments.subjects),
@@ -49,10 +49,10 @@ pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
     let to = arguments.to.clone().unwrap_or_else(default);
     write_page(&to, &page(&subjects?)?, "<p>by gyre report, ")?;
     print::line(to.display())?;
-    if arguments.open {
-        open(&to)?;
+    match arguments.open {
+        true => open(&to),
+        false => Ok(()),
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Returns the runs and trajectories, each run with the trajectory that its loops have corrected.

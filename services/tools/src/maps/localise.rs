@@ -7,7 +7,6 @@ pub mod searched_map;
 use std::{
     fmt::Write,
     path::{Path, PathBuf},
-    process::ExitCode,
     time::Instant,
 };
 
@@ -70,7 +69,7 @@ struct Figures<'a> {
 
 /// Localises the scans of a recording in a map, and writes `fixes.csv`.
 /// If no scan was found, the error is returned after all files are written.
-pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
+pub fn localise(arguments: &LocaliseArguments) -> Result<(), Failure> {
     let configuration = arguments.inputs.configuration()?;
     let mut localiser = searched_map::open(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
@@ -106,7 +105,7 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
         print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
     }
     match found.has_fix() {
-        true => Ok(ExitCode::SUCCESS),
+        true => Ok(()),
         false => {
             let (data, map) = (configuration.data(), arguments.map.display());
             Err(format!("no scan of {data} was found in {map}: it may be of another place, or made with settings for another radar. If the first {FIRST} scans are not found, {PROBES} others over the drive are searched; source.first and source.scans choose a part").into())

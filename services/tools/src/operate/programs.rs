@@ -41,11 +41,10 @@ pub struct SwapArguments {
     pub cold: bool,
 }
 
-pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
+pub fn restart(arguments: &RestartArguments) -> Result<(), Failure> {
     let run = chosen_to_change(&arguments.run)?;
     run.restart(&arguments.process)?;
-    print::line(format_args!("{} is started again", arguments.process))?;
-    Ok(ExitCode::SUCCESS)
+    print::line(format_args!("{} is started again", arguments.process))
 }
 
 const EXPLAIN_AFTER_S: f64 = 5.0;

@@ -5,7 +5,6 @@ mod snapshot;
 
 use std::{
     io::{self, IsTerminal},
-    process::ExitCode,
     time::{Duration, Instant},
 };
 
@@ -36,7 +35,7 @@ pub struct TopArguments {
 /// Time between two snapshots at the queue of poses, which has room for nine.
 const PERIOD: Duration = Duration::from_millis(50);
 
-pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
+pub fn top(arguments: &TopArguments) -> Result<(), Failure> {
     let every = Duration::try_from_secs_f64(arguments.every)
         .ok()
         .filter(|every| *every >= PERIOD)
@@ -53,8 +52,7 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
         let signals = Signals::install()?;
         snapshots.take()?;
         wait(&mut snapshots, every, || Ok(signals.sleep(PERIOD)?))?;
-        print::line(screen::text(&snapshots.take()?, width()))?;
-        return Ok(ExitCode::SUCCESS);
+        return print::line(screen::text(&snapshots.take()?, width()));
     }
     let mut terminal = ratatui::try_init()
         .map_err(|error| format!("the terminal cannot be used: {error}; --once prints text"))?;
@@ -65,7 +63,7 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
         print::line(screen::text(&last, width()))?;
         print::line("the run has ended")?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// Returns the columns of the terminal; an arbitrary number if the output is not a terminal.
