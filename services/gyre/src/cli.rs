@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 use gyre_configuration::terminal::inputs::ConfigArguments;
 use gyre_results::evaluate::EvaluateArguments;
 use gyre_tools::{
+    conformance::{ConformanceArguments, shadow::ShadowArguments},
     export::ExportArguments,
     maps::{localise::LocaliseArguments, map::MapArguments},
     masks::MasksArguments,
@@ -24,10 +25,8 @@ use crate::{
     arguments::{LinkEnd, Ros2Arguments, RunArguments, RunOptions},
     batch::BatchArguments,
     calibrate::CalibrateArguments,
-    conformance::ConformanceArguments,
     inspect::InspectArguments,
     record::RecordArguments,
-    shadow::ShadowArguments,
     simulate::SimulateArguments,
     stress::StressArguments,
     watch::WatchArguments,

@@ -17,10 +17,15 @@ mod rule;
 mod session;
 pub mod shadow;
 
-use std::{io, path::Path, time::Duration};
+use std::{
+    io,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
+use clap::{Args, builder::PossibleValuesParser};
 use gyre_client::{RunError, Signals};
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::terminal::{Failure, inputs::Inputs, seconds};
 use gyre_contract::StageId;
 use gyre_supervise::{SuperviseError, rig::Rig};
 
@@ -32,32 +37,61 @@ pub use rule::{Rule, Verdict};
 use checks::Examination;
 use reference::{Context, Reference};
 
+#[derive(Debug, Args)]
+pub struct ConformanceArguments {
+    /// The stage that the program replaces.
+    #[arg(value_parser = PossibleValuesParser::new(StageId::ALL.map(StageId::name)))]
+    pub stage: String,
+    /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved.
+    /// Default: the command of the stage in the configuration, else Gyre's own stage.
+    #[arg(long, value_name = "COMMAND")]
+    pub command: Option<String>,
+    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
+    #[arg(long, value_name = "FILE", conflicts_with = "command")]
+    pub python: Option<PathBuf>,
+    #[command(flatten)]
+    pub inputs: Inputs,
+    /// Scans to test with, 8 or more.
+    #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u16).range(8..=1000))]
+    pub scans: u16,
+    /// The results must equal the results of Gyre's own stage, to the bit.
+    #[arg(long)]
+    pub same_as_own: bool,
+    /// The 99th percentile of the work on an item must be at most this, ms; of fewer than a hundred
+    /// items the maximum. The first four do not count.
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
+    pub budget_ms: Option<Duration>,
+    /// Time for the program to open its topics, s.
+    #[arg(long, default_value = "30", value_name = "S", value_parser = seconds)]
+    pub start_timeout_s: Duration,
+    /// Time for the program to answer an item, or to refuse it, s.
+    #[arg(long, default_value = "10", value_name = "S", value_parser = seconds)]
+    pub patience_s: Duration,
+    /// Time for the program to exit after SIGTERM, s. A run gives it 2 s.
+    #[arg(long, default_value = "2", value_name = "S", value_parser = seconds)]
+    pub stop_timeout_s: Duration,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn milliseconds(text: &str) -> Result<Duration, &'static str> {
+    seconds(text).map(|seconds| seconds / 1000)
+}
+
 /// Writes the other files of a run's root, as the list of a recording's files.
 type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
 
-/// A program that is to keep the contract of a stage, and its limits.
-pub struct Test {
+/// A program that is to keep the contract of a stage.
+pub struct Test<'a> {
     /// The program. Each of its runs writes to a folder below its manifest's `out`.
     pub candidate: Candidate,
     pub stages: Vec<StageId>,
     pub prepare: Prepare,
-    pub demands: Demands,
+    pub arguments: &'a ConformanceArguments,
 }
 
-#[derive(Clone, Debug)]
-pub struct Demands {
-    pub start_timeout: Duration,
-    pub item_timeout: Duration,
-    /// Time for its exit after SIGTERM, and after an input that it has to refuse.
-    pub stop_timeout: Duration,
-    /// True if its results must equal the results of Gyre's own stage, to the bit.
-    pub same_as_own: bool,
-    /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items
-    /// the maximum.
-    pub budget: Option<Duration>,
-}
-
-impl Test {
+impl Test<'_> {
     pub(crate) fn rig<'a>(
         &self,
         name: &str,
@@ -75,7 +109,7 @@ impl Test {
 /// Breaches of the contract are in the report, not in the error. A signal ends the test with
 /// [`RunError::Stopped`].
 pub fn check(
-    test: &Test,
+    test: &Test<'_>,
     signals: &Signals,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Report, Failure> {

@@ -82,7 +82,7 @@ impl<'a> Examination<'a> {
         }
         self.refusals()?;
         let mut answers = None;
-        if self.context.test.demands.budget.is_some() {
+        if self.context.test.arguments.budget_ms.is_some() {
             (self.observe)("the time of its answers");
             answers = self.timing()?;
         }
@@ -90,19 +90,19 @@ impl<'a> Examination<'a> {
     }
 
     fn note_inapplicable_rules(&mut self) {
-        let (stage, demands) = (self.stage(), &self.context.test.demands);
+        let (stage, arguments) = (self.stage(), self.context.test.arguments);
         let lag = self.context.test.candidate.manifest.window.lag;
         let is_source = stage == StageId::RadarReplay;
         let is_masking = stage == StageId::Masking;
         let is_sink = stage == StageId::PoseIntegration;
-        let has_budget = demands.budget.is_some();
+        let has_budget = arguments.budget_ms.is_some();
         for (applies, rule, reason) in [
             (!is_source, Rule::CopiesItem, "a source makes the items"),
             (is_source, Rule::KeepsWindow, "it is no source"),
             (is_masking, Rule::WaitsForMotion, "it is not masking"),
             (lag > 0, Rule::WaitsForMotion, "masking.lag is 0"),
             (is_sink, Rule::BeginsWithNewest, "it is not the sink"),
-            (demands.same_as_own, Rule::SameAsOwn, "not asked for"),
+            (arguments.same_as_own, Rule::SameAsOwn, "not asked for"),
             (has_budget, Rule::KeepsBudget, "not asked for"),
         ] {
             if !applies {
@@ -123,7 +123,7 @@ impl<'a> Examination<'a> {
         // It may wait for its topics as long as it likes.
         while process.death().is_none()
             && !has_created()
-            && since.elapsed() <= test.demands.item_timeout
+            && since.elapsed() <= test.arguments.patience_s
         {
             rig.sleep(&[], POLL_PERIOD)?;
         }
@@ -194,7 +194,7 @@ impl<'a> Examination<'a> {
         } = self.context;
         let (stage, topic) = (self.stage(), test.candidate.topics().output);
         let work = Work::of(work_on(stage, &self.outputs));
-        if test.demands.same_as_own && !self.outputs.is_empty() {
+        if test.arguments.same_as_own && !self.outputs.is_empty() {
             for own in reference.topic(topic) {
                 let seq = own.item().seq;
                 let bytes = result_bytes(topic, own)?;
@@ -204,7 +204,7 @@ impl<'a> Examination<'a> {
                 });
             }
         }
-        if let Some(budget) = test.demands.budget {
+        if let Some(budget) = test.arguments.budget_ms {
             self.judge_times("by its own stamps", work, budget);
             self.judge_times("by our clock, until its answer,", answers, budget);
         }

@@ -15,7 +15,7 @@ use gyre_contract::{Item, Message, Pose, StageId, flag};
 use gyre_supervise::{Death, SuperviseError, rig::Recorded};
 
 use crate::conformance::{
-    Demands, Test,
+    ConformanceArguments, Test,
     harness::{Harness, Sent, start_of_trajectory},
     item::{not_copied, wrong_stamps},
     reference::{Context, POLL_PERIOD, Reference},
@@ -39,7 +39,7 @@ pub(crate) enum Pace {
 
 pub(crate) struct Session<'a> {
     pub harness: Harness<'a>,
-    pub test: &'a Test,
+    pub test: &'a Test<'a>,
     pub reference: &'a Reference,
     pub findings: &'a mut Findings,
     pub pace: Pace,
@@ -113,8 +113,8 @@ impl<'a> Session<'a> {
         self.test.candidate.stage
     }
 
-    pub(crate) fn demands(&self) -> &'a Demands {
-        &self.test.demands
+    pub(crate) fn arguments(&self) -> &'a ConformanceArguments {
+        self.test.arguments
     }
 
     pub(crate) fn output_topic(&self) -> &'static str {
@@ -129,7 +129,7 @@ impl<'a> Session<'a> {
 
     /// Waits until the process has answered an item; the limit is that for one item.
     pub(crate) fn reach(&mut self, seq: u64) -> Result<Waited, Failure> {
-        let limit = self.demands().item_timeout;
+        let limit = self.arguments().patience_s;
         self.wait(limit, |session| session.newest >= Some(seq))
     }
 

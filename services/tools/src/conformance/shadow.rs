@@ -14,12 +14,13 @@ mod shadowing;
 
 use std::{fs, path::PathBuf, time::Duration};
 
+use clap::Args;
 use gyre_client::{Manifest, Run, RunError, Signals};
-use gyre_configuration::terminal::Failure;
-use gyre_contract::{StageId, Window};
+use gyre_configuration::terminal::{Failure, own, seconds, words};
+use gyre_contract::{StageId, Window, run::StageConfig};
 use gyre_supervise::Scheduling;
 
-use crate::conformance::Candidate;
+use crate::{conformance::Candidate, operate::RunChoice};
 
 pub use record::Counts;
 pub use report::{Beside, Report, Verdict};
@@ -28,20 +29,55 @@ use life::ShadowProgram;
 use record::Record;
 use shadowing::Shadowing;
 
-#[derive(Clone, Debug)]
-pub struct Options {
-    pub stage: StageId,
-    pub command: Vec<String>,
-    pub scheduling: Scheduling,
-    /// Time for it to open its topics.
-    pub start_timeout: Duration,
-    pub item_timeout: Duration,
-    /// Items to compare; `None`: until the run ends.
+#[derive(Debug, Args)]
+pub struct ShadowArguments {
+    /// The stage: masking, rotation-search, translation-search, joint-search or refinement.
+    pub stage: String,
+    #[command(flatten)]
+    pub run: RunChoice,
+    /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved.
+    /// Default: Gyre's own stage.
+    #[arg(long, value_name = "COMMAND")]
+    pub command: Option<String>,
+    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
+    #[arg(long, value_name = "FILE", conflicts_with = "command")]
+    pub python: Option<PathBuf>,
+    /// Items to compare. Default: until the run ends.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub scans: Option<u64>,
-    /// Time after which it ends.
+    /// Time after which it ends, s.
+    #[arg(long, value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
-    /// A folder for `shadow.json`, `shadow.csv`, and the output of the program, `shadow.txt`.
+    /// Write shadow.json, shadow.csv with a row for each item, and the program's output,
+    /// shadow.txt, to this folder.
+    #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    /// Niceness of the program, -20 to 19: the run goes first.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(i32).range(-20..=19))]
+    pub nice: i32,
+    /// Time for the program to open its topics, s.
+    #[arg(long, default_value = "30", value_name = "S", value_parser = seconds)]
+    pub start_timeout_s: Duration,
+    /// Time for the program to answer an item, s.
+    #[arg(long, default_value = "10", value_name = "S", value_parser = seconds)]
+    pub patience_s: Duration,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl ShadowArguments {
+    pub fn command(&self, stage: StageId) -> Result<Vec<String>, Failure> {
+        let (gyre, python) = (own(), self.python.as_deref());
+        match &self.command {
+            Some(command) => words(command),
+            None => Ok(StageConfig::own_command(
+                &gyre.to_string_lossy(),
+                stage.name(),
+                python,
+            )),
+        }
+    }
 }
 
 /// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal
@@ -49,18 +85,20 @@ pub struct Options {
 /// report, not in the error.
 pub fn shadow(
     run: &Run,
-    options: &Options,
+    stage: StageId,
+    command: Vec<String>,
+    arguments: &ShadowArguments,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Report, Failure> {
     let signals = Signals::install()?;
-    let in_report = |name| options.report.as_ref().map(|folder| folder.join(name));
-    if let Some(folder) = &options.report {
+    let in_report = |name| arguments.report.as_ref().map(|folder| folder.join(name));
+    if let Some(folder) = &arguments.report {
         gyre_storage::create_folder(folder).map_err(RunError::from)?;
     }
     let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
     let folder = folder.map_err(RunError::file(&std::env::temp_dir()))?;
     let program = ShadowProgram {
-        candidate: candidate(run, options)?,
+        candidate: candidate(run, stage, command, arguments.nice)?,
         folder: folder.path().to_owned(),
         output: in_report("shadow.txt"),
     };
@@ -68,10 +106,10 @@ pub fn shadow(
         fs::write(path, "").map_err(RunError::file(path))?;
     }
     let topic = program.candidate.topics().output;
-    let record = Record::new(options.stage, topic, in_report("shadow.csv").as_deref())?;
-    let shadowing = Shadowing::begin(options, &program, run, &signals, record)?;
+    let record = Record::new(stage, topic, in_report("shadow.csv").as_deref())?;
+    let shadowing = Shadowing::begin(arguments, &program, run, &signals, record)?;
     let record = shadowing.run(observe)?;
-    let report = Report::of(options.stage.name(), &options.command, &record);
+    let report = Report::of(&program.candidate, &record);
     if let Some(path) = in_report("shadow.json") {
         let text = serde_json::to_string_pretty(&report);
         let text = text.map_err(|error| format!("cannot write shadow.json: {error}"))?;
@@ -82,13 +120,21 @@ pub fn shadow(
 
 /// Returns the program, in a run like the observed one but lossless: the scans that the run's
 /// masking has dropped are not sent at all.
-fn candidate(run: &Run, options: &Options) -> Result<Candidate, RunError> {
+fn candidate(
+    run: &Run,
+    stage: StageId,
+    command: Vec<String>,
+    nice: i32,
+) -> Result<Candidate, RunError> {
     let manifest = run.manifest();
     let configuration = manifest.root.join("config.toml");
     Ok(Candidate {
-        stage: options.stage,
-        command: options.command.clone(),
-        scheduling: options.scheduling.clone(),
+        stage,
+        command,
+        scheduling: Scheduling {
+            nice: Some(nice),
+            ..Scheduling::default()
+        },
         manifest: Manifest {
             live: false,
             window: Window {

@@ -46,7 +46,7 @@ impl Examination<'_> {
         let ready = root.join(format!("{}.ready", session.stage().name()));
         session.admit()?;
         session.spawn(true)?;
-        let limit = session.demands().start_timeout;
+        let limit = session.arguments().start_timeout_s;
         let waited = session.wait(limit, |session| ready.exists() || session.has_joined())?;
         let lives = session.rest()?;
         let breach = match (ready.exists(), session.has_joined()) {

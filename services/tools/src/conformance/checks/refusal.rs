@@ -53,7 +53,7 @@ impl Examination<'_> {
             session.feed(&[*other], WRONG)?;
         }
         session.harness.feed(topic, message)?;
-        let ending = session.ended_within(session.demands().item_timeout)?;
+        let ending = session.ended_within(session.arguments().patience_s)?;
         let is_sent = forward.contains(&topic) && session.has(WRONG);
         session
             .findings

@@ -59,7 +59,7 @@ impl Examination<'_> {
         let end = self.context.reference.end() as usize;
         let (mut session, _) = self.begin("window", Pace::Hold, u64::MAX)?;
         let window = session.harness.rig.manifest().window.scans.min(end);
-        let limit = session.demands().item_timeout;
+        let limit = session.arguments().patience_s;
         session.wait(limit, |it| it.outputs.len() >= window)?;
         session.rest()?;
         let sent = session.outputs.len();
@@ -76,7 +76,7 @@ impl Session<'_> {
     pub(super) fn starts(&mut self) -> Result<bool, Failure> {
         let topic = self.output_topic();
         self.spawn(false)?;
-        let limit = self.demands().start_timeout;
+        let limit = self.arguments().start_timeout_s;
         let waited = self.wait(limit, |session| session.harness.has_publisher())?;
         let is_open = waited.is_done();
         self.findings
@@ -89,7 +89,7 @@ impl Session<'_> {
 
     /// Requires that it subscribes to its inputs, and the handshake of each.
     fn joins(&mut self) -> Result<(), Failure> {
-        let limit = self.demands().item_timeout;
+        let limit = self.arguments().patience_s;
         self.findings.checked(Rule::AsksForHistory);
         self.wait(limit, |session| session.not_read().is_empty())?;
         for topic in self.not_read() {
@@ -102,7 +102,7 @@ impl Session<'_> {
 
     /// Requires that it notifies the publisher of each topic that it has subscribed to.
     fn asks_for_history(&mut self) -> Result<(), Failure> {
-        let limit = self.demands().item_timeout;
+        let limit = self.arguments().patience_s;
         self.wait(limit, |session| session.not_notified().is_empty())?;
         for topic in self.not_notified() {
             let sentence = format!(
@@ -159,7 +159,7 @@ impl Session<'_> {
         let sizes = gyre_contract::topic(topic).map(|it| (it.sizes)(&rig.manifest().window));
         let wanted = sizes.map_or(0, |it| it.history).min(self.outputs.len());
         let (late, received) = (rig.tap(topic)?, Cell::new(0));
-        self.wait(self.demands().item_timeout, |_| {
+        self.wait(self.arguments().patience_s, |_| {
             while late.receive().is_ok_and(|message| message.is_some()) {
                 received.set(received.get() + 1);
             }
@@ -173,7 +173,7 @@ impl Session<'_> {
     }
 
     pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
-        let limit = self.demands().stop_timeout;
+        let limit = self.arguments().stop_timeout_s;
         self.harness.terminate();
         self.pace = Pace::Hold;
         let breach = match self.ended_within(limit)? {

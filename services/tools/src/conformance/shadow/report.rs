@@ -6,7 +6,7 @@ use gyre_contract::run::latency::Percentiles;
 use serde::Serialize;
 
 use super::record::{Counts, Record, Times};
-use crate::conformance::Spreads;
+use crate::conformance::{Candidate, Spreads};
 
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -39,11 +39,11 @@ pub struct Beside {
 }
 
 impl Report {
-    pub(crate) fn of(stage: &'static str, command: &[String], record: &Record) -> Self {
+    pub(crate) fn of(candidate: &Candidate, record: &Record) -> Self {
         let counts = record.counts;
         Self {
-            stage,
-            command: command.to_vec(),
+            stage: candidate.stage.name(),
+            command: candidate.command.clone(),
             counts,
             differences: record.differences.spreads(),
             work: Beside::of(&record.work),

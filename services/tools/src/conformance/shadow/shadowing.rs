@@ -13,7 +13,7 @@ use gyre_configuration::terminal::Failure;
 use gyre_contract::StageId;
 
 use super::{
-    Options,
+    ShadowArguments,
     life::{Life, ShadowProgram},
     observation::{Observation, Observed},
     record::{Record, keep},
@@ -34,7 +34,7 @@ const BACKOFF: Duration = Duration::from_secs(1);
 const MAX_FAILURES: u64 = 3;
 
 pub(crate) struct Shadowing<'a> {
-    options: &'a Options,
+    arguments: &'a ShadowArguments,
     program: &'a ShadowProgram,
     signals: &'a Signals,
     topic: &'static str,
@@ -65,7 +65,7 @@ struct UnderWay {
 
 impl<'a> Shadowing<'a> {
     pub(crate) fn begin(
-        options: &'a Options,
+        arguments: &'a ShadowArguments,
         program: &'a ShadowProgram,
         run: &'a Run,
         signals: &'a Signals,
@@ -74,23 +74,23 @@ impl<'a> Shadowing<'a> {
         let now = Instant::now();
         let candidate = &program.candidate;
         let (topics, out) = (candidate.topics(), candidate.manifest.out.display());
-        let (command, stage) = (candidate.command.join(" "), options.stage.name());
+        let (command, stage) = (candidate.command.join(" "), candidate.stage);
         Ok(Self {
-            options,
+            arguments,
             program,
             signals,
             topic: topics.output,
-            observation: Observation::of(run, options.stage, &topics)?,
+            observation: Observation::of(run, stage, &topics)?,
             taken: now,
             backlog: VecDeque::new(),
             life: None,
-            renumbering: Renumbering::new(options.stage, run.manifest().window.lag),
+            renumbering: Renumbering::new(stage, run.manifest().window.lag),
             under_way: None,
             unanswerable: None,
             due: now,
             failures: 0,
             record,
-            lines: vec![format!("`{command}` beside {stage} of {out}")],
+            lines: vec![format!("`{command}` beside {} of {out}", stage.name())],
         })
     }
 
@@ -103,7 +103,7 @@ impl<'a> Shadowing<'a> {
             self.take(has_ended)?;
             self.attend()?;
             self.lines.drain(..).for_each(|line| observe(&line));
-            let (limit, scans) = (self.options.duration, self.options.scans);
+            let (limit, scans) = (self.arguments.duration, self.arguments.scans);
             let is_over = limit.is_some_and(|limit| began.elapsed() >= limit);
             let has_enough = scans.is_some_and(|scans| self.record.counts.compared >= scans);
             if is_over || has_enough || self.is_done(has_ended) || self.sleep()? {
@@ -149,7 +149,8 @@ impl<'a> Shadowing<'a> {
     }
 
     fn bound_backlog(&mut self) -> Result<(), RunError> {
-        let starts_again = self.options.stage == StageId::Refinement && self.life.is_some();
+        let starts_again =
+            self.program.candidate.stage == StageId::Refinement && self.life.is_some();
         let limit = match starts_again {
             true => BACKLOG_OF_REFINEMENT,
             false => BACKLOG,
@@ -199,13 +200,13 @@ impl<'a> Shadowing<'a> {
 
     fn start(&mut self) -> Result<(), Failure> {
         // A refinement begins with a copy of the state after its first item, which has to be there.
-        let waits = self.options.stage == StageId::Refinement && self.backlog.is_empty();
+        let waits = self.program.candidate.stage == StageId::Refinement && self.backlog.is_empty();
         if waits || Instant::now() < self.due {
             return Ok(());
         }
         self.record.counts.starts += 1;
         self.renumbering = Renumbering::new(
-            self.options.stage,
+            self.program.candidate.stage,
             self.program.candidate.manifest.window.lag,
         );
         self.life = Some(Life::begin(self.program, self.signals)?);
@@ -214,7 +215,7 @@ impl<'a> Shadowing<'a> {
 
     fn hangs(&self) -> Option<String> {
         let life = self.life.as_ref()?;
-        let (start, item_timeout) = (self.options.start_timeout, self.options.item_timeout);
+        let (start, item_timeout) = (self.arguments.start_timeout_s, self.arguments.patience_s);
         if !life.is_open {
             let topic = self.topic;
             return (life.began.elapsed() > start)

@@ -45,7 +45,7 @@ impl Shadowing<'_> {
     }
 
     fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), Failure> {
-        let stage = self.options.stage;
+        let stage = self.program.candidate.stage;
         let (item, sent) = (output.item(), &it.sent.item);
         for field in not_copied(stage, sent, &item) {
             let seq = it.observed.seq();
