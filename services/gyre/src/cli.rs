@@ -19,6 +19,7 @@ use gyre_tools::{
     },
     radar_server::RadarServerArguments,
     report::ReportArguments,
+    stress::StressArguments,
 };
 
 use crate::{
@@ -28,7 +29,6 @@ use crate::{
     inspect::InspectArguments,
     record::RecordArguments,
     simulate::SimulateArguments,
-    stress::StressArguments,
     watch::WatchArguments,
 };
 

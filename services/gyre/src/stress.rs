@@ -1,11 +1,10 @@
 //! `gyre stress`: whether a pipeline meets its deadline on this computer.
 
-use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
+use std::{fs, process::ExitCode, time::Duration};
 
-use clap::Args;
 use gyre_configuration::{
     Configuration,
-    terminal::{Failure, inputs::Inputs, own, print},
+    terminal::{Failure, own, print},
 };
 use gyre_contract::{StageId, run::Scenario};
 use gyre_matching::RefinementKind;
@@ -14,44 +13,13 @@ use gyre_results::{
     machine::{Machine, today},
 };
 use gyre_tools::stress::{
-    Options, Others, Provenance, Report, TestedPipeline, report::Verdict, witness_fault,
+    Others, Provenance, Report, StressArguments, TestedPipeline, report::Verdict,
 };
 
 use crate::{arguments::RunArguments, preflight, program, run::resolve, simulate};
 
-#[derive(Debug, Args)]
-pub struct StressArguments {
-    /// The configuration, whose section `[budget]` is the verdict, and the recording. Default: the
-    /// configuration's simulation, which is rendered first, or its source.data.
-    #[command(flatten)]
-    pub inputs: Inputs,
-    /// A scenario; may be repeated. Default: all.
-    #[arg(long = "scenario", value_name = "NAME")]
-    pub scenarios: Vec<Scenario>,
-    /// Print the scenarios, a line each.
-    #[arg(long)]
-    pub list: bool,
-    /// The folder of the report. Default: `out/stress`.
-    #[arg(long, default_value = "out/stress")]
-    pub out: PathBuf,
-    /// Time for which each scenario is measured, s.
-    #[arg(long, value_name = "S", default_value = "60", value_parser = seconds, conflicts_with = "quick")]
-    pub duration: f64,
-    /// As --duration 10, for continuous integration.
-    #[arg(long)]
-    pub quick: bool,
-    /// The stage that is slowed, stopped or killed; may be repeated. Default: masking is slowed,
-    /// all are stopped or killed.
-    #[arg(long = "stage", value_name = "NAME", value_parser = stage)]
-    pub stages: Vec<StageId>,
-    /// For the order of stages that are stopped or killed.
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
-}
-
 /// The exit code without a verdict on the pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
-const QUICK_S: f64 = 10.0;
 /// The longest part of a simulated drive that is rendered, scans: a minute of a 4 Hz radar. It is
 /// played again and again.
 const RENDERED: usize = 240;
@@ -111,13 +79,11 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         budget: configuration.budget.clone(),
         shared_bytes: checked.footprint.total() as u64,
     };
-    let options = options(arguments, &tested)?;
     let provenance = provenance(arguments, &configuration)?;
     let mut printed = Ok(());
     let judged = &mut |verdict: &str| printed = print::line(verdict);
     let note = &mut |line: &str| print::note(line);
-    let mut report = gyre_tools::stress::stress(&tested, &options, note, judged);
-    report.provenance = provenance;
+    let report = gyre_tools::stress::stress(&tested, arguments, provenance, note, judged)?;
     report.write(out.path())?;
     printed?;
     print::line(format_args!(
@@ -141,40 +107,6 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     Ok(())
 }
 
-/// All scenarios except faults of gyro and wheels that are absent from the run or its recording.
-fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
-    let all = Scenario::ALL.into_iter();
-    all.filter(|scenario| match witness_fault::lacks(tested, *scenario) {
-        None => true,
-        Some(lacking) => {
-            print::note(format_args!("{scenario}: left out: {lacking}"));
-            false
-        }
-    })
-    .collect()
-}
-
-fn options(arguments: &StressArguments, tested: &TestedPipeline) -> Result<Options, Failure> {
-    let scenarios = match arguments.scenarios.is_empty() {
-        true => possible(tested),
-        false => arguments.scenarios.clone(),
-    };
-    let duration_s = match arguments.quick {
-        true => QUICK_S,
-        false => arguments.duration,
-    };
-    let mut stages = arguments.stages.iter();
-    match stages.find(|stage| !tested.stages.contains(stage)) {
-        None => Ok(Options {
-            scenarios,
-            duration: Duration::from_secs_f64(duration_s),
-            stages: arguments.stages.clone(),
-            seed: arguments.seed,
-        }),
-        Some(stage) => Err(format!("this run has no stage {}", stage.name()).into()),
-    }
-}
-
 fn provenance(
     arguments: &StressArguments,
     configuration: &Configuration,
@@ -187,19 +119,5 @@ fn provenance(
         build: program::digest(&own())?,
         configuration: file.map_or_else(|| configuration.data(), |file| file.display().to_string()),
         source: configuration.data(),
-    })
-}
-
-/// Parses a duration: 2 s to a week.
-fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok();
-    let seconds = seconds.filter(|seconds| (2.0..=604_800.0).contains(seconds));
-    seconds.ok_or_else(|| "a number from 2 to 604800 is needed".to_owned())
-}
-
-fn stage(name: &str) -> Result<StageId, String> {
-    StageId::by_name(name).ok_or_else(|| {
-        let names = StageId::ALL.map(StageId::name).join(", ");
-        format!("there is no stage `{name}`; there are {names}")
     })
 }

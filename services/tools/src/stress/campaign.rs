@@ -10,7 +10,7 @@ use gyre_contract::{
 };
 
 use crate::stress::{
-    Report, TestedPipeline,
+    Provenance, Report, StressArguments, TestedPipeline,
     fault::{self, FaultKind},
     helper::Work,
     pipeline::{Measured, Setup, measure},
@@ -36,33 +36,32 @@ const MOST_RADARS: u32 = 64;
 /// The rate of the source has a limit: 1000 times the sensor's own.
 const MOST_HZ: f64 = 1000.0;
 
-#[derive(Clone, Debug)]
-pub struct Options {
-    pub scenarios: Vec<Scenario>,
-    pub duration: Duration,
-    /// The stages that are stopped, killed or slowed; empty: all, and masking is slowed.
-    pub stages: Vec<StageId>,
-    /// For the choice of stages.
-    pub seed: u64,
-}
-
 /// Carries out all scenarios. `note` receives lines about the progress, `judged` each verdict.
 ///
 /// A scenario that could not be carried out has that as its verdict, and the next ones follow.
 pub fn stress(
     tested: &TestedPipeline,
-    options: &Options,
+    arguments: &StressArguments,
+    provenance: Provenance,
     note: &mut dyn FnMut(&str),
     judged: &mut dyn FnMut(&str),
-) -> Report {
+) -> Result<Report, Failure> {
+    let mut stages = arguments.stages.iter();
+    if let Some(stage) = stages.find(|stage| !tested.stages.contains(stage)) {
+        return Err(format!("this run has no stage {}", stage.name()).into());
+    }
+    let scenarios = match arguments.scenarios.is_empty() {
+        true => possible(tested, note),
+        false => arguments.scenarios.clone(),
+    };
     let mut outcomes = Vec::new();
-    for scenario in &options.scenarios {
+    for scenario in scenarios {
         note(&format!("{scenario}: {}", scenario.line()));
         let campaign = Campaign {
             tested,
-            options,
-            scenario: *scenario,
-            limits: tested.budget.of(*scenario),
+            arguments,
+            scenario,
+            limits: tested.budget.of(scenario),
         };
         let outcome = campaign.outcome(note);
         let outcome = outcome.unwrap_or_else(|error| ScenarioOutcome {
@@ -75,12 +74,26 @@ pub fn stress(
     }
     // Helpers that were killed have left files in shared memory.
     sweep();
-    Report::of(outcomes)
+    Ok(Report::of(outcomes, provenance))
+}
+
+/// Returns all scenarios except faults of gyro and wheels that are absent from the run or its
+/// recording.
+fn possible(tested: &TestedPipeline, note: &mut dyn FnMut(&str)) -> Vec<Scenario> {
+    let mut all = Vec::from(Scenario::ALL);
+    all.retain(|scenario| match witness_fault::lacks(tested, *scenario) {
+        None => true,
+        Some(lacking) => {
+            note(&format!("{scenario}: left out: {lacking}"));
+            false
+        }
+    });
+    all
 }
 
 struct Campaign<'a> {
     tested: &'a TestedPipeline,
-    options: &'a Options,
+    arguments: &'a StressArguments,
     scenario: Scenario,
     limits: Limits,
 }
@@ -95,7 +108,7 @@ impl Campaign<'_> {
     }
 
     fn empty(&self) -> ScenarioOutcome {
-        ScenarioOutcome::new(self.scenario, self.options.duration)
+        ScenarioOutcome::new(self.scenario, self.arguments.duration)
     }
 
     fn single(&self) -> Result<ScenarioOutcome, Failure> {
@@ -121,14 +134,14 @@ impl Campaign<'_> {
     }
 
     fn setup(&self) -> Result<Setup, Failure> {
-        let (scenario, options) = (self.scenario, self.options);
-        let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), options.duration);
+        let (scenario, arguments) = (self.scenario, self.arguments);
+        let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), arguments.duration);
         let faults = |kind| {
-            let stages = match options.stages.as_slice() {
+            let stages = match arguments.stages.as_slice() {
                 [] => self.tested.stages.as_slice(),
                 stages => stages,
             };
-            Some((kind, stages.to_vec(), options.seed))
+            Some((kind, stages.to_vec(), arguments.seed))
         };
         match scenario {
             Scenario::Bursts => {
@@ -169,7 +182,7 @@ impl Campaign<'_> {
     }
 
     fn slow_stages(&self) -> impl Iterator<Item = String> {
-        let stages = match self.options.stages.as_slice() {
+        let stages = match self.arguments.stages.as_slice() {
             [] => &[StageId::Masking],
             stages => stages,
         };
@@ -241,7 +254,7 @@ impl Campaign<'_> {
     }
 
     fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, Failure> {
-        let duration = step_duration(self.options.duration, rate_hz);
+        let duration = step_duration(self.arguments.duration, rate_hz);
         let setups = (0..pipelines).map(|number| Setup {
             name: format!("{}-{number}", self.scenario),
             ..Setup::undisturbed(self.scenario, rate_hz, duration)

@@ -38,10 +38,10 @@ pub struct Report {
 }
 
 impl Report {
-    pub fn of(outcomes: Vec<ScenarioOutcome>) -> Self {
+    pub fn of(outcomes: Vec<ScenarioOutcome>, provenance: Provenance) -> Self {
         Self {
             version: VERSION,
-            provenance: Provenance::default(),
+            provenance,
             outcomes,
         }
     }

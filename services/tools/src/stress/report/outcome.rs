@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::stress::{
         fault::{Fault, FaultKind},
-        report::Report,
+        report::{Provenance, Report},
     };
 
     #[test]
@@ -203,7 +203,7 @@ mod tests {
         }
         let failed = outcome(Scenario::Steady, 0, &[300.0]).judged();
         assert!(failed.sentence().contains("p99_ms 300.0, limit 250"));
-        assert!(Report::of(vec![failed]).has(Verdict::Failed));
+        assert!(Report::of(vec![failed], Provenance::default()).has(Verdict::Failed));
     }
 
     #[test]
