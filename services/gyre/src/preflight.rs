@@ -11,7 +11,7 @@ use gyre_configuration::{
 };
 use gyre_contract::{
     Footprint, Limits, StageId, Window,
-    run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind},
+    run::{LinkConfig, MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind},
 };
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
 use gyre_geometry::samples::{MAX_SAMPLES, SensorKind};
@@ -24,8 +24,6 @@ use gyre_stages::{
 use gyre_tools::maps::localise::searched_map;
 use gyre_transport::{Manifest, run::free_shared_memory};
 use rustix::process::{Resource, getrlimit};
-
-use crate::split;
 
 pub struct Preflight {
     pub scans: Scans,
@@ -59,7 +57,7 @@ pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
 
 /// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
 pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflight, Failure> {
-    split::check(configuration)?;
+    check_link(&configuration.link)?;
     let masker = Masker::new(
         &configuration.odometry.raster,
         &configuration.odometry.points,
@@ -78,7 +76,7 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
     }
     let scans = match configuration.is_radar() {
         true => Scans::of_radar(configuration, ask)?,
-        false if configuration.is_side(Side::Base) => Scans::of_base(configuration)?,
+        false if configuration.is_side(Side::Base) => Scans::of_base(&configuration.link)?,
         false if configuration.source.from != PlayedFrom::Scan => {
             Scans::of_messages(configuration)?
         }
@@ -189,12 +187,22 @@ impl Scans {
         })
     }
 
-    /// Returns the properties of the robot's scans, which a base asks for before the run.
-    fn of_base(configuration: &Configuration) -> Result<Self, Failure> {
+    /// Returns the properties of the robot's scans, which a base asks for before the run if scans
+    /// are sent.
+    fn of_base(link: &LinkConfig) -> Result<Self, Failure> {
         Ok(Self {
-            count: None,
             period_ns: DEFAULT_TURN_NS,
-            bytes: split::scan_bytes(&configuration.link)?,
+            bytes: match link.cut {
+                #[cfg(feature = "link")]
+                PlayedFrom::Scan => {
+                    let name = &link.name;
+                    print::note(format_args!(
+                        "link {name}: waiting for the robot, which knows how large its scans are"
+                    ));
+                    gyre_link::ask_robot(link)?
+                }
+                _ => 0,
+            },
             ..Self::default()
         })
     }
@@ -231,13 +239,27 @@ impl Scans {
     }
 }
 
+/// Checks that the other side of a split run can be reached as it is configured.
+fn check_link(link: &LinkConfig) -> Result<(), Failure> {
+    if link.side.is_none() {
+        return Ok(());
+    }
+    #[cfg(not(feature = "link"))]
+    return Err(crate::absent(crate::LINK).into());
+    #[cfg(feature = "link")]
+    gyre_link::check(link).map_err(|error| format!("[link]: {error}").into())
+}
+
 pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
         #[cfg(feature = "ros2")]
-        SourceKind::Ros2 => crate::ros2::ask(source, options),
+        SourceKind::Ros2 => {
+            use gyre_ros2_bridge::source::{Settings, ask};
+            Ok(ask(&Settings::of(source, options)?)?)
+        }
         #[cfg(not(feature = "ros2"))]
-        SourceKind::Ros2 => Err(crate::features::absent("ROS 2").into()),
+        SourceKind::Ros2 => Err(crate::absent("ROS 2").into()),
         _ => Ok(gyre_stages::live_radar::ask(&Settings::of(
             source, options,
         )?)?),

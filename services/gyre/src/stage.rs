@@ -139,7 +139,9 @@ fn play(launch: &Launch) -> Result<StageCounters, RunError> {
         }
         #[cfg(feature = "ros2")]
         SourceKind::Ros2 => {
-            return crate::ros2::receive(launch, &source, &launch.section("dataset")?);
+            use gyre_ros2_bridge::source::{self, Settings};
+            let settings = Settings::of(&source, &launch.section("dataset")?);
+            return source::run(launch, settings.map_err(RunError::Input)?);
         }
         // A build without ROS 2 refuses to begin a run from there.
         _ => {}
