@@ -52,9 +52,8 @@ pub fn serve(
     arguments: &RadarServerArguments,
     stop: &dyn Fn() -> bool,
 ) -> Result<Played, Failure> {
-    let first = scans.start;
     let mut scan = OwnedScan::with_limits(dataset.limits());
-    scan.geometry = dataset.read(first, scan.slot())?;
+    scan.geometry = dataset.read(scans.start, scan.slot())?;
     let encoder_size = dataset.encoder_counts().unwrap_or(ENCODER_COUNTS);
     let radar = configuration(dataset, &scan.geometry, encoder_size)?;
     let (output, address, is_public) = Output::open(arguments, &radar)?;
@@ -64,28 +63,30 @@ pub fn serve(
             "gyre: whoever reaches this address receives the scans: Navtech's protocol has no token",
         );
     }
-    let mut player = Player::new(output, radar, arguments, stop);
-    if !player.output.describe(&player.radar, stop) {
-        return Ok(player.ended());
+    let mut player = Player {
+        output,
+        radar,
+        arguments,
+        clock: ClockFormat {
+            // Datagrams always have the network's order.
+            order: match arguments.big_endian || arguments.udp.is_some() {
+                true => ByteOrder::Big,
+                false => ByteOrder::Little,
+            },
+            ..ClockFormat::default()
+        },
+        stop,
+        message: Vec::new(),
+        started: None,
+        shift_ns: 0,
+        sweep_counter: 0,
+        played: Played::default(),
+    };
+    player.play_all(dataset, scans, scan)?;
+    if let Output::Group(group) = &player.output {
+        player.played.lost_datagrams = group.lost;
     }
-    loop {
-        let mut last_ns = 0;
-        for index in scans.clone() {
-            scan.geometry = dataset.read(index, scan.slot())?;
-            if !player.play(scan.view()) {
-                return Ok(player.ended());
-            }
-            last_ns = scan.view().stamp_ns.last().copied().unwrap_or(last_ns);
-        }
-        if !arguments.repeat {
-            player.output.close();
-            return Ok(player.ended());
-        }
-        scan.geometry = dataset.read(first, scan.slot())?;
-        let first_ns = scan.stamp_ns.first().copied().unwrap_or_default();
-        player.shift_ns +=
-            last_ns - first_ns + dataset.period_ns() / scan.geometry.azimuths.max(1) as i64;
-    }
+    Ok(player.played)
 }
 
 /// Returns the configuration message of a radar with these scans.
@@ -124,9 +125,7 @@ pub(crate) fn configuration(
 struct Player<'a> {
     output: Output,
     radar: Configuration,
-    faults: Faults,
-    /// Factor of the recorded pace; `None`: as fast as the clients read.
-    rate: Option<f64>,
+    arguments: &'a RadarServerArguments,
     clock: ClockFormat,
     stop: &'a dyn Fn() -> bool,
     message: Vec<u8>,
@@ -139,31 +138,33 @@ struct Player<'a> {
 }
 
 impl<'a> Player<'a> {
-    fn new(
-        output: Output,
-        radar: Configuration,
-        arguments: &RadarServerArguments,
-        stop: &'a dyn Fn() -> bool,
-    ) -> Self {
-        Self {
-            output,
-            radar,
-            faults: arguments.faults,
-            rate: arguments.rate.factor(),
-            clock: ClockFormat {
-                // Datagrams always have the network's order.
-                order: match arguments.big_endian || arguments.udp.is_some() {
-                    true => ByteOrder::Big,
-                    false => ByteOrder::Little,
-                },
-                ..ClockFormat::default()
-            },
-            stop,
-            message: Vec::new(),
-            started: None,
-            shift_ns: 0,
-            sweep_counter: 0,
-            played: Played::default(),
+    /// Plays these scans until a request to stop.
+    fn play_all(
+        &mut self,
+        dataset: &mut dyn Dataset,
+        scans: Range<usize>,
+        mut scan: OwnedScan,
+    ) -> Result<(), Failure> {
+        if !self.output.describe(&self.radar, self.stop) {
+            return Ok(());
+        }
+        loop {
+            let mut last_ns = 0;
+            for index in scans.clone() {
+                scan.geometry = dataset.read(index, scan.slot())?;
+                if !self.play(scan.view()) {
+                    return Ok(());
+                }
+                last_ns = scan.view().stamp_ns.last().copied().unwrap_or(last_ns);
+            }
+            if !self.arguments.repeat {
+                self.output.close();
+                return Ok(());
+            }
+            scan.geometry = dataset.read(scans.start, scan.slot())?;
+            let first_ns = scan.stamp_ns.first().copied().unwrap_or_default();
+            self.shift_ns +=
+                last_ns - first_ns + dataset.period_ns() / scan.geometry.azimuths.max(1) as i64;
         }
     }
 
@@ -172,7 +173,7 @@ impl<'a> Player<'a> {
         if !self.has_client() {
             return false;
         }
-        let faults = self.faults;
+        let faults = self.arguments.faults;
         let number = self.played.scans;
         if is_nth(number, faults.stall_every) {
             self.played.stalls += 1;
@@ -208,26 +209,15 @@ impl<'a> Player<'a> {
         !(self.stop)()
     }
 
-    fn ended(self) -> Played {
-        let lost_datagrams = match &self.output {
-            Output::Clients(_) => 0,
-            Output::Group(group) => group.lost,
-        };
-        Played {
-            lost_datagrams,
-            ..self.played
-        }
-    }
-
     /// Waits for a first client; at the pace of the clients for one after each loss, too.
     fn has_client(&self) -> bool {
-        let waits = self.started.is_none() || self.rate.is_none();
+        let waits = self.started.is_none() || self.arguments.rate.factor().is_none();
         !waits || self.output.await_client(self.stop)
     }
 
     /// Waits until an azimuth is due; false on a request to stop.
     fn wait_until_due(&mut self, stamp_ns: i64) -> bool {
-        let Some(rate) = self.rate else {
+        let Some(rate) = self.arguments.rate.factor() else {
             self.started.get_or_insert((Instant::now(), stamp_ns));
             return true;
         };
@@ -243,7 +233,7 @@ impl<'a> Player<'a> {
     }
 
     fn send(&mut self, scan: &PolarScan<'_>, row: usize) {
-        let faults = self.faults;
+        let faults = self.arguments.faults;
         let encoder_size = self.radar.encoder_size;
         let turns = f64::from(scan.azimuth_rad[row]) / TAU;
         let encoder = (turns * f64::from(encoder_size)).round() as u16 % encoder_size;
