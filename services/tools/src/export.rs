@@ -16,6 +16,7 @@ use gyre_ros2_messages::{
 };
 
 pub use arguments::{ExportArguments, FrameArguments, ScanForm};
+pub use repaired::write_grey;
 use scans::ScanWriter;
 use source::{Place, Source};
 

@@ -3,7 +3,6 @@
 mod drawing;
 mod inspection;
 mod inspector;
-pub mod picture;
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
