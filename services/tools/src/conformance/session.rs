@@ -12,7 +12,10 @@ use std::{
 use gyre_client::RunError;
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Item, Message, Pose, StageId, flag};
-use gyre_supervise::{Death, SuperviseError, rig::Recorded};
+use gyre_supervise::{
+    Death, SuperviseError,
+    rig::{Process, Recorded},
+};
 
 use crate::conformance::{
     ConformanceArguments, Test,
@@ -240,7 +243,8 @@ impl<'a> Session<'a> {
     }
 
     pub(crate) fn kill(&mut self) -> Result<(), Failure> {
-        self.harness.kill()?;
+        let process = self.harness.process.take();
+        process.map_or(Ok(()), Process::kill)?;
         self.receive()?;
         Ok(self.harness.rig.remove_dead()?)
     }

@@ -8,7 +8,7 @@
 
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Item, StageId, flag};
-use gyre_supervise::rig::Recorded;
+use gyre_supervise::rig::{Process, Recorded};
 
 use super::Examination;
 use crate::conformance::{
@@ -66,7 +66,11 @@ impl Examination<'_> {
             session.findings.broken(Rule::StandsBy, breach);
             return Ok(());
         }
-        session.harness.end_input();
+        session
+            .harness
+            .process
+            .iter_mut()
+            .for_each(Process::end_input);
         let until = session.reference.end() / 3;
         let mut waited = session.wait(limit, |session| session.harness.has_publisher())?;
         if waited.is_done() {

@@ -5,6 +5,7 @@ use std::cell::Cell;
 
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{StageId, flag};
+use gyre_supervise::rig::Process;
 
 use super::Examination;
 use crate::conformance::{
@@ -174,7 +175,7 @@ impl Session<'_> {
 
     pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
         let limit = self.arguments().stop_timeout_s;
-        self.harness.terminate();
+        self.harness.process.iter().for_each(Process::terminate);
         self.pace = Pace::Hold;
         let breach = match self.ended_within(limit)? {
             None => Some(format!(

@@ -9,7 +9,7 @@ use std::{
 
 use gyre_client::{RunError, Signals};
 use gyre_contract::{StageId, run::REFINEMENT_STATE};
-use gyre_supervise::SuperviseError;
+use gyre_supervise::{SuperviseError, rig::Process};
 
 use crate::conformance::{
     Candidate,
@@ -74,7 +74,7 @@ impl<'a> Life<'a> {
     }
 
     pub(crate) fn end(&mut self) -> Result<(), RunError> {
-        self.harness.terminate();
+        self.harness.process.iter().for_each(Process::terminate);
         let since = Instant::now();
         while self.harness.death().is_none() && since.elapsed() < STOP_TIMEOUT {
             std::thread::sleep(POLL_PERIOD);
