@@ -9,7 +9,6 @@
 mod checks;
 mod harness;
 mod item;
-mod malformed;
 mod reference;
 mod report;
 mod result;

@@ -9,7 +9,6 @@ mod life;
 mod observation;
 mod record;
 mod renumbering;
-mod report;
 mod shadowing;
 
 use std::{fs, path::PathBuf, time::Duration};
@@ -22,8 +21,7 @@ use gyre_supervise::Scheduling;
 
 use crate::{conformance::Candidate, operate::RunChoice};
 
-pub use record::Counts;
-pub use report::{Beside, Report, Verdict};
+pub use record::{Beside, Counts, Report, Verdict};
 
 use life::ShadowProgram;
 use record::Record;

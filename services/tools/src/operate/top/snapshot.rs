@@ -86,8 +86,7 @@ impl Snapshots {
     pub fn take_poses(&mut self) -> Result<(), Failure> {
         while let Next::Message(pose, _) = self.poses.next(Duration::ZERO)? {
             let pose = *pose.header();
-            let done_ns = pose.item.hops.iter().map(|hop| hop.finished_ns).max();
-            let latency_ns = done_ns.unwrap_or_default() - pose.item.due_ns;
+            let latency_ns = pose.item.sensor_to_pose_ns();
             self.longest_us = self.longest_us.max(latency_ns.max(0) as u64 / 1000);
             self.recent.push_back(pose);
             self.has_new = true;
