@@ -1,7 +1,6 @@
 //! `gyre masks`: draws the mask's effect on scans.
 
 mod drawing;
-mod inspection;
 mod inspector;
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
@@ -13,7 +12,7 @@ use gyre_configuration::{
     terminal::{Failure, inputs::Inputs, print},
 };
 use gyre_results::Content;
-use inspector::MaskInspector;
+use inspector::{HEADER, MaskInspector};
 
 /// Number of scans that are drawn by default, and maximum on the overview.
 const FEW: usize = 8;
@@ -54,7 +53,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<(), Failure> {
     Content::MASKS.require_place(out)?;
     gyre_storage::create_folder(out)?;
     if !arguments.json {
-        print::line(inspection::HEADER)?;
+        print::line(HEADER)?;
     }
     let (mut overview, apart) = (Vec::new(), chosen.len().div_ceil(FEW));
     let mut figures = Vec::new();

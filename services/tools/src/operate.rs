@@ -7,7 +7,6 @@
 mod background;
 mod choice;
 mod echo;
-mod hz;
 mod logs;
 mod processes;
 mod programs;

@@ -1,7 +1,6 @@
 //! `gyre report`: one page about a run, or about several runs and the trajectories of other
 //! programs beside each other. The page has all its pictures in it and needs no network.
 
-mod html;
 mod page;
 mod subject;
 

@@ -7,7 +7,6 @@
 mod campaign;
 pub mod fault;
 pub mod helper;
-pub mod load;
 pub mod pipeline;
 pub mod processes;
 pub mod record;

@@ -13,7 +13,7 @@ use gyre_ros2_messages::{
 
 use crate::{
     export::{
-        arguments::ScanForm,
+        ScanForm,
         source::{Lost, Scans, Source},
     },
     radar_server::configuration,
