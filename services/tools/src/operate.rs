@@ -7,6 +7,7 @@
 mod background;
 mod choice;
 mod echo;
+mod hz;
 mod logs;
 mod processes;
 mod programs;
