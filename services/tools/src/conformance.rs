@@ -8,11 +8,9 @@
 
 mod checks;
 mod harness;
-mod item;
 mod reference;
 mod report;
 mod result;
-mod rule;
 mod session;
 pub mod shadow;
 
@@ -29,9 +27,8 @@ use gyre_contract::StageId;
 use gyre_supervise::{SuperviseError, rig::Rig};
 
 pub use harness::Candidate;
-pub use report::{Report, Work};
+pub use report::{Report, Rule, Verdict, Work};
 pub use result::{Spread, Spreads};
-pub use rule::{Rule, Verdict};
 
 use checks::Examination;
 use reference::{Context, Reference};

@@ -12,11 +12,9 @@ use gyre_contract::{StageId, flag};
 use gyre_supervise::rig::Recorded;
 
 use crate::conformance::{
-    item::work_ns,
     reference::{Context, POLL_PERIOD},
-    report::{Report, Work},
-    result::result_bytes,
-    rule::{Findings, Rule},
+    report::{Findings, Report, Rule, Work},
+    result::{result_bytes, work_ns},
     session::{Pace, Session},
 };
 

@@ -1,7 +1,6 @@
 //! `gyre map`: draws the map of a run.
 
 mod arguments;
-mod extend;
 pub mod placing;
 
 use std::{
@@ -39,7 +38,7 @@ const ODOMETRY: &str = "trajectory.tum";
 /// asked for.
 pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
     let mut drawing = match &arguments.extend {
-        Some(map) => extend::extend(arguments, map)?,
+        Some(map) => placing::extend(arguments, map)?,
         None => draw_run(arguments)?,
     };
     let (keyframes, tiles) = (drawing.keyframes(), drawing.evidence().tiles().len());

@@ -6,7 +6,7 @@ use gyre_contract::{Masked, Message, Motion, Scan};
 
 use super::Examination;
 use crate::conformance::{
-    rule::Rule,
+    report::Rule,
     session::{Pace, Session},
 };
 

@@ -12,7 +12,7 @@ use gyre_supervise::rig::{Process, Recorded};
 
 use super::Examination;
 use crate::conformance::{
-    rule::Rule,
+    report::Rule,
     session::{Pace, Session, Waited},
 };
 

@@ -7,7 +7,7 @@ use gyre_contract::{Masked, Message, Motion, Pose, Rotation, Scan};
 use gyre_supervise::rig::Recorded;
 
 use super::Examination;
-use crate::conformance::{result::floats, rule::Rule, session::Pace};
+use crate::conformance::{report::Rule, result::floats, session::Pace};
 
 const WRONG: u64 = 2;
 

@@ -9,8 +9,8 @@ use gyre_supervise::rig::Process;
 
 use super::Examination;
 use crate::conformance::{
+    report::Rule,
     result::result_bytes,
-    rule::Rule,
     session::{Pace, Session, Waited},
 };
 

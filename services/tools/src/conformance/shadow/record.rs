@@ -14,8 +14,7 @@ use serde::Serialize;
 
 use crate::conformance::{
     Candidate, Spreads,
-    item::work_ns,
-    result::{Differences, result_bytes},
+    result::{Differences, result_bytes, work_ns},
 };
 
 /// Sentences about breaches and deaths that are kept; more are counted.

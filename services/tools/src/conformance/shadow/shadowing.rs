@@ -20,7 +20,7 @@ use super::{
 };
 use crate::conformance::{
     harness::Sent,
-    item::{not_copied, wrong_stamps},
+    result::{not_copied, wrong_stamps},
 };
 
 /// Items that wait for the shadow at most; then all but the newest are skipped.

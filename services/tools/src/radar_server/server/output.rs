@@ -13,7 +13,7 @@ use gyre_colossus::{
 
 use gyre_configuration::terminal::Failure;
 
-use super::{Faults, clients::Clients, faults::uniform, unserved};
+use super::{Faults, clients::Clients, uniform, unserved};
 use crate::radar_server::RadarServerArguments;
 
 /// The longest time between two checks for a request to stop.
