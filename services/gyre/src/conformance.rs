@@ -8,7 +8,10 @@ use gyre_configuration::{
     with_stored_options,
 };
 use gyre_contract::{StageId, run::Scheduling};
-use gyre_tools::conformance::{Candidate, ConformanceArguments, Report, Test, check};
+use gyre_tools::{
+    conformance::{Candidate, ConformanceArguments, Report, Test, check},
+    doctor::check_shared_memory,
+};
 use gyre_transport::{RunError, wake::Signals};
 
 use crate::{arguments::RunArguments, preflight, program, run::resolve};
@@ -39,7 +42,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
     let command = command(arguments, &configuration, stage)?;
     preflight::check_open_files()?;
     let checked = preflight::check(&configuration, &mut preflight::ask)?;
-    preflight::check_shared_memory(&checked.footprint)?;
+    check_shared_memory(&checked.footprint)?;
     describe_masks(&configuration)?.iter().for_each(print::note);
     let folder = tempfile::Builder::new()
         .prefix("gyre-conformance-")

@@ -20,7 +20,6 @@ pub mod record;
 #[cfg(feature = "ros2")]
 pub mod ros2;
 pub mod run;
-pub mod shadow;
 pub mod simulate;
 pub mod stage;
 pub mod stress;
@@ -74,7 +73,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Run(arguments) => return run::run(&arguments),
         Command::Demo { set, options } => return run::run(&of_demo(set, options)),
         Command::Swap(arguments) => return gyre_tools::operate::swap(&arguments),
-        Command::Shadow(arguments) => return shadow::shadow(&arguments),
+        Command::Shadow(arguments) => return gyre_tools::conformance::shadow::shadow(&arguments),
         Command::Batch(arguments) => return batch::batch(&arguments),
         Command::BatchDrive { parent, run } => return batch::drive(parent, &run),
         Command::Stress(arguments) => return stress::stress(&arguments),

@@ -22,7 +22,7 @@ use gyre_stages::{
     radar_replay::{Listing, Player},
 };
 use gyre_tools::maps::localise::searched_map;
-use gyre_transport::{Manifest, run::free_shared_memory};
+use gyre_transport::Manifest;
 use rustix::process::{Resource, getrlimit};
 
 pub struct Preflight {
@@ -276,20 +276,6 @@ pub fn check_open_files() -> Result<(), Failure> {
     match getrlimit(Resource::Nofile).current {
         Some(limit) if limit < MOST_OPEN_FILES => Err(format!(
             "a process may have {limit} open files, but one of a run has up to {MOST_OPEN_FILES}: raise the limit with `ulimit -n 1024`"
-        )
-        .into()),
-        _ => Ok(()),
-    }
-}
-
-/// Acquire the run's root first, which removes the memory of killed runs.
-pub fn check_shared_memory(footprint: &Footprint) -> Result<(), Failure> {
-    let free = free_shared_memory();
-    let free = free.map_err(|error| format!("cannot use shared memory at /dev/shm: {error}"))?;
-    match free {
-        Some(free) if free < footprint.total() as u64 => Err(format!(
-            "shared memory at /dev/shm has {:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), or lower run.window or raster.n",
-            free as f64 / 1e6
         )
         .into()),
         _ => Ok(()),

@@ -21,7 +21,7 @@ use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
-use gyre_tools::operate::detach_if_asked;
+use gyre_tools::{doctor::check_shared_memory, operate::detach_if_asked};
 use gyre_transport::{
     Manifest, RunError,
     run::{RunRoot, sweep},
@@ -183,7 +183,7 @@ fn play(
         out = earlier::close(out, reason)?;
     }
     let root = RunRoot::acquire(out.path(), &signals)?;
-    preflight::check_shared_memory(&checked.footprint)?;
+    check_shared_memory(&checked.footprint)?;
     prepare(configuration, &ready, &out, unfinished)?;
     let plan = plan_in(&root, &ready, programs, &out)?;
 

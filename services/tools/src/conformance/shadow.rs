@@ -1,4 +1,4 @@
-//! Shadow mode: a second program for a stage of a running run. It gets the same inputs as the
+//! `gyre shadow`: a second program for a stage of a running run. It gets the same inputs as the
 //! stage, its results are compared with the stage's and timed, and nobody uses them.
 //!
 //! To the run this process is an observer ([`gyre_client::observer`]): the run neither waits for it
@@ -11,15 +11,20 @@ mod record;
 mod renumbering;
 mod shadowing;
 
-use std::{fs, path::PathBuf, time::Duration};
+use std::{fs, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::Args;
-use gyre_client::{Manifest, Run, RunError, Signals};
-use gyre_configuration::terminal::{Failure, own, seconds, words};
-use gyre_contract::{StageId, Window, run::StageConfig};
+use gyre_client::{Manifest, Run, RunError, Signals, control::Control};
+use gyre_configuration::terminal::{Failure, own, print, seconds, words};
+use gyre_contract::{FollowerId, Footprint, StageId, Window, run::StageConfig};
+use gyre_results::{Content, Out};
 use gyre_supervise::Scheduling;
 
-use crate::{conformance::Candidate, operate::RunChoice};
+use crate::{
+    conformance::Candidate,
+    doctor::check_shared_memory,
+    operate::{RunChoice, chosen},
+};
 
 pub use record::{Beside, Counts, Report, Verdict};
 
@@ -65,7 +70,7 @@ pub struct ShadowArguments {
 }
 
 impl ShadowArguments {
-    pub fn command(&self, stage: StageId) -> Result<Vec<String>, Failure> {
+    fn command(&self, stage: StageId) -> Result<Vec<String>, Failure> {
         let (gyre, python) = (own(), self.python.as_deref());
         match &self.command {
             Some(command) => words(command),
@@ -78,21 +83,74 @@ impl ShadowArguments {
     }
 }
 
-/// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal
-/// requests a stop. `observe` receives lines about the progress. Faults of the program are in the
-/// report, not in the error.
-pub fn shadow(
+/// The exit code is 1 if nothing was compared, or the program died, hung or broke the contract.
+pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
+    let stage = stage(&arguments.stage)?;
+    let command = arguments.command(stage)?;
+    let folder = arguments.report.as_deref();
+    let locked = folder.map(|folder| Out::lock_for(folder, Content::SHADOW));
+    let _locked = locked.transpose()?;
+    let control = chosen(&arguments.run)?;
+    require_stage(&control, stage)?;
+    let run = Run::open(control.out())?;
+    let manifest = run.manifest();
+    let window = Window {
+        observers: 0,
+        ..manifest.window
+    };
+    check_shared_memory(&Footprint::new(&window, &manifest.limits))?;
+    let report = compare(&run, stage, command, arguments)?;
+    match arguments.json {
+        true => print::line(serde_json::to_string_pretty(&report)?)?,
+        false => print::line(&report)?,
+    }
+    Ok(match report.is_sound() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}
+
+fn stage(name: &str) -> Result<StageId, Failure> {
+    let stages: Vec<&str> = StageId::between().map(StageId::name).collect();
+    let stages = stages.join(", ");
+    let stage = StageId::by_name(name);
+    if let Some(stage) = StageId::between().find(|it| Some(*it) == stage) {
+        return Ok(stage);
+    }
+    let reason = match stage {
+        Some(StageId::RadarReplay) => "is a source, which has no inputs",
+        Some(_) => "adds up all motions since the start of the run and owns its journal",
+        None if FollowerId::by_name(name).is_some() => "reads the run's logs and no topics",
+        None => {
+            return Err(
+                format!("there is no stage `{name}`; these can have a shadow: {stages}").into(),
+            );
+        }
+    };
+    Err(format!("{name} cannot have a shadow, since it {reason}; these can: {stages}").into())
+}
+
+/// Requires that the run has the stage: joint-search stands in the place of the other two searches.
+fn require_stage(control: &Control, stage: StageId) -> Result<(), Failure> {
+    let processes = control.status()?.processes;
+    let names: Vec<_> = processes.iter().map(|it| it.name.as_str()).collect();
+    let (stage, list) = (stage.name(), names.join(", "));
+    match names.contains(&stage) {
+        true => Ok(()),
+        false => Err(format!("the run has no {stage}; it has {list}").into()),
+    }
+}
+
+/// Compares until the run ends, a limit is reached, or a signal requests a stop. Faults of the
+/// program are in the report, not in the error.
+fn compare(
     run: &Run,
     stage: StageId,
     command: Vec<String>,
     arguments: &ShadowArguments,
-    observe: &mut dyn FnMut(&str),
 ) -> Result<Report, Failure> {
     let signals = Signals::install()?;
     let in_report = |name| arguments.report.as_ref().map(|folder| folder.join(name));
-    if let Some(folder) = &arguments.report {
-        gyre_storage::create_folder(folder).map_err(RunError::from)?;
-    }
     let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
     let folder = folder.map_err(RunError::file(&std::env::temp_dir()))?;
     let program = ShadowProgram {
@@ -105,8 +163,7 @@ pub fn shadow(
     }
     let topic = program.candidate.topics().output;
     let record = Record::new(stage, topic, in_report("shadow.csv").as_deref())?;
-    let shadowing = Shadowing::begin(arguments, &program, run, &signals, record)?;
-    let record = shadowing.run(observe)?;
+    let record = Shadowing::begin(arguments, &program, run, &signals, record)?.run()?;
     let report = Report::of(&program.candidate, &record);
     if let Some(path) = in_report("shadow.json") {
         let text = serde_json::to_string_pretty(&report);

@@ -3,11 +3,12 @@
 
 use std::{
     collections::VecDeque,
+    fmt::Display,
     time::{Duration, Instant},
 };
 
 use gyre_client::{Listener, MAX_WAIT, Run, RunError, Signals, clock};
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::{Item, StageId, flag};
 use gyre_supervise::rig::Recorded;
 
@@ -54,7 +55,6 @@ pub(crate) struct Shadowing<'a> {
     /// Ends since the last compared item.
     failures: u64,
     record: Record,
-    lines: Vec<String>,
 }
 
 struct UnderWay {
@@ -64,6 +64,10 @@ struct UnderWay {
     since: Instant,
     /// True if it had the item before, and so nothing else to do.
     is_timed: bool,
+}
+
+fn say(line: impl Display) {
+    print::note(format_args!("gyre shadow: {line}"));
 }
 
 impl<'a> Shadowing<'a> {
@@ -78,12 +82,14 @@ impl<'a> Shadowing<'a> {
         let candidate = &program.candidate;
         let (topics, out) = (candidate.topics(), candidate.manifest.out.display());
         let (command, stage) = (candidate.command.join(" "), candidate.stage);
+        let observation = Observation::of(run, stage, &topics)?;
+        say(format_args!("`{command}` beside {} of {out}", stage.name()));
         Ok(Self {
             arguments,
             program,
             signals,
             topic: topics.output,
-            observation: Observation::of(run, stage, &topics)?,
+            observation,
             taken: now,
             backlog: VecDeque::new(),
             life: None,
@@ -93,19 +99,17 @@ impl<'a> Shadowing<'a> {
             due: now,
             failures: 0,
             record,
-            lines: vec![format!("`{command}` beside {} of {out}", stage.name())],
         })
     }
 
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
-    pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, Failure> {
+    pub(crate) fn run(mut self) -> Result<Record, Failure> {
         let began = Instant::now();
         loop {
             // Before the poll: the messages before the end are still in the queues.
             let has_ended = self.observation.has_ended();
             self.take(has_ended)?;
             self.attend()?;
-            self.lines.drain(..).for_each(|line| observe(&line));
             let (limit, scans) = (self.arguments.duration, self.arguments.scans);
             let is_over = limit.is_some_and(|limit| began.elapsed() >= limit);
             let has_enough = scans.is_some_and(|scans| self.record.counts.compared >= scans);
@@ -236,7 +240,7 @@ impl<'a> Shadowing<'a> {
             true => "it is not started again",
             false => "it is started again",
         };
-        self.lines.push(format!("{sentence}; {again}"));
+        say(format_args!("{sentence}; {again}"));
         keep(&mut self.record.ends, sentence);
         self.end_life(BACKOFF)
     }
@@ -361,8 +365,7 @@ impl<'a> Shadowing<'a> {
 
     fn breach(&mut self, sentence: String) {
         if self.record.counts.breaches == 0 {
-            self.lines
-                .push(format!("it breaks the contract: {sentence}"));
+            say(format_args!("it breaks the contract: {sentence}"));
         }
         self.record.breach(sentence);
     }
