@@ -88,7 +88,7 @@ impl<'a> Steps<'a> {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Step {
     /// Scans a second, or radars.
     pub level: f64,
@@ -108,11 +108,8 @@ impl Step {
     pub fn not_started(level: f64, reason: String) -> Self {
         Self {
             level,
-            passed: false,
-            due: 0,
-            dropped: 0,
-            p99_ms: None,
             reason: Some(reason),
+            ..Self::default()
         }
     }
 
