@@ -13,8 +13,7 @@ use gyre_colossus::{
 
 use gyre_configuration::terminal::Failure;
 
-use super::{Faults, clients::Clients, uniform, unserved};
-use crate::radar_server::RadarServerArguments;
+use super::{Faults, RadarServerArguments, clients::Clients, uniform, unserved};
 
 /// The longest time between two checks for a request to stop.
 const SLICE: Duration = Duration::from_millis(50);
