@@ -23,7 +23,7 @@ use rustix::process::Signal;
 use crate::{
     arguments::RunArguments,
     earlier::{self, Earlier},
-    program,
+    plan,
     run::{self, resolve},
 };
 
@@ -181,14 +181,15 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     run::place_recording(&mut configuration, &out);
     // By whatever build. `None`: a run reports files that cannot be read, and keeps its poses.
     let is_same = Identity::read(&out)
-        .and_then(|begun| begun.has_inputs_of(&configuration, &program::replaced(&configuration)?))
+        .and_then(|begun| begun.has_inputs_of(&configuration, &plan::replaced(&configuration)?))
         .ok();
     let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
     if is_complete && is_same == Some(true) {
         return Ok(End::new(Outcome::Complete, true, ""));
     }
     // A run of another configuration, build or version is discarded.
-    let earlier = Earlier::of(&out, &configuration, &program::now(&configuration)?, false)?;
+    let programs = plan::programs(&configuration)?;
+    let earlier = Earlier::of(&out, &configuration, &programs, false)?;
     let is_foreign = matches!(earlier, Earlier::Foreign(_) | Earlier::Complete(_));
     let discards = is_foreign || is_same == Some(false);
     match run::compute(configuration, out, discards, Form::Table)? {

@@ -14,7 +14,7 @@ use gyre_tools::{
 };
 use gyre_transport::{RunError, wake::Signals};
 
-use crate::{arguments::RunArguments, preflight, program, run::resolve};
+use crate::{arguments::RunArguments, plan, preflight, run::resolve};
 
 /// The shape of the program's messages matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
@@ -54,7 +54,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             stage,
             command,
             scheduling: Scheduling::default(),
-            manifest: checked.manifest(&configuration, folder.path(), program::digest(&own())?),
+            manifest: checked.manifest(&configuration, folder.path(), plan::digest(&own())?),
             configuration: configuration.to_toml()?,
         },
         stages: StageId::ALL

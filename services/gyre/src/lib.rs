@@ -14,7 +14,6 @@ pub mod link;
 pub mod notify;
 pub mod plan;
 pub mod preflight;
-pub mod program;
 pub mod progress;
 pub mod record;
 #[cfg(feature = "ros2")]

@@ -35,7 +35,6 @@ use crate::{
     notify::Notifier,
     plan,
     preflight::{self, Preflight},
-    program,
     progress::Progress,
     simulate, waiting,
 };
@@ -73,7 +72,7 @@ pub(crate) fn compute(
     // memory itself.
     sweep();
     place_recording(&mut configuration, &out);
-    let programs = program::now(&configuration)?;
+    let programs = plan::programs(&configuration)?;
     match Earlier::of(&out, &configuration, &programs, fresh)? {
         Earlier::Foreign(reason) if !earlier::is_closed(&configuration) => Err(reason),
         Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun, form),

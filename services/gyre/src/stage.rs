@@ -30,7 +30,7 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::program;
+use crate::plan;
 
 type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, RunError>>;
 
@@ -100,7 +100,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), RunError> {
     if file(&path).is_some_and(|own| file(&supervisor) == Some(own)) {
         return Ok(());
     }
-    let build = program::digest(&path).map_err(|source| RunError::File { path, source })?;
+    let build = plan::digest(&path).map_err(|source| RunError::File { path, source })?;
     match build == manifest.build {
         true => Ok(()),
         false => Err(RunError::Input(

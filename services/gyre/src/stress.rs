@@ -16,7 +16,7 @@ use gyre_tools::stress::{
     Others, Provenance, Report, StressArguments, TestedPipeline, report::Verdict,
 };
 
-use crate::{arguments::RunArguments, preflight, program, run::resolve, simulate};
+use crate::{arguments::RunArguments, plan, preflight, run::resolve, simulate};
 
 /// The exit code without a verdict on the pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
@@ -116,7 +116,7 @@ fn provenance(
         date: today(),
         machine: Machine::this().to_string(),
         gyre: env!("CARGO_PKG_VERSION").to_owned(),
-        build: program::digest(&own())?,
+        build: plan::digest(&own())?,
         configuration: file.map_or_else(|| configuration.data(), |file| file.display().to_string()),
         source: configuration.data(),
     })

@@ -12,7 +12,7 @@ use gyre_results::{
 };
 use toml::Table;
 
-use crate::report::subject::{Run, Subject};
+use crate::report::{Run, Subject};
 
 /// The groups of figures that stand behind the pictures.
 const LAST: [&str; 2] = ["Counts", "Versions"];
