@@ -6,9 +6,8 @@
 
 mod compute;
 pub mod list;
-mod row;
 pub mod table;
 
 pub use compute::{COMMAND, compute};
 pub use list::{Drive, List};
-pub use row::{End, Outcome, Row};
+pub use table::{End, Outcome, Row};

@@ -13,8 +13,7 @@ use gyre_contract::{Item, StageId, flag};
 use gyre_supervise::rig::Recorded;
 
 use super::{
-    ShadowArguments,
-    life::{Life, ShadowProgram},
+    Life, ShadowArguments, ShadowProgram,
     observation::{Observation, Observed},
     record::{Record, keep},
     renumbering::{Entry, Renumbering, SentItem},
