@@ -55,16 +55,6 @@ pub struct LocaliseArguments {
     pub json: bool,
 }
 
-/// The figures of a drive, as `--json` prints them.
-#[derive(Serialize)]
-struct Figures<'a> {
-    #[serde(flatten)]
-    counts: &'a Counts,
-    left_out: usize,
-    ms_a_scan: f64,
-    fixes: PathBuf,
-}
-
 /// Localises the scans of a recording in a map, and writes `fixes.csv`.
 /// If no scan was found, the error is returned after all files are written.
 pub fn localise(arguments: &LocaliseArguments) -> Result<(), Failure> {
@@ -88,19 +78,15 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<(), Failure> {
     let drawn = draw(&arguments.map, &found, out);
     ended?;
     drawn?;
-    let counts = Counts::of(&found.scans);
     let figures = Figures {
-        counts: &counts,
         left_out: scans.left_out,
         ms_a_scan,
         fixes: out.join(FIXES),
+        ..Figures::of(&found.scans)
     };
-    if arguments.json {
-        print::line(serde_json::to_string_pretty(&figures)?)?;
-    } else {
-        print::line(counts.summary(figures.left_out))?;
-        let fixes = figures.fixes.display();
-        print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
+    match arguments.json {
+        true => print::line(serde_json::to_string_pretty(&figures)?)?,
+        false => print::line(figures.summary())?,
     }
     match found.has_fix() {
         true => Ok(()),
@@ -233,8 +219,9 @@ const LISTED: usize = 10;
 /// A scan: its number, its time in ns, and whether it was found.
 type Located = (usize, i64, Status);
 
-#[derive(Debug, Serialize)]
-struct Counts {
+/// The figures of a drive, as `--json` prints them.
+#[derive(Debug, Default, Serialize)]
+struct Figures {
     found: usize,
     tracked: usize,
     predicted: usize,
@@ -243,9 +230,12 @@ struct Counts {
     first_fix: Option<(usize, f64)>,
     /// The first and the last scan of each span where the localiser was lost.
     lost_scans: Vec<(usize, usize)>,
+    left_out: usize,
+    ms_a_scan: f64,
+    fixes: PathBuf,
 }
 
-impl Counts {
+impl Figures {
     fn of(scans: &[Located]) -> Self {
         let count = |status: Status| scans.iter().filter(|it| it.2 == status).count();
         let after_s = |stamp_ns: i64| stamp_ns.saturating_sub(scans[0].1) as f64 * 1e-9;
@@ -260,10 +250,11 @@ impl Counts {
             lost: count(Status::Lost),
             first_fix: first.map(|(number, stamp_ns, _)| (*number, after_s(*stamp_ns))),
             lost_scans: lost.map(|it| (it[0].0, it[it.len() - 1].0)).collect(),
+            ..Self::default()
         }
     }
 
-    fn summary(&self, left_out: usize) -> String {
+    fn summary(&self) -> String {
         let mut text = match self.first_fix {
             Some((scan, after_s)) => format!("first fix: scan {scan}, after {after_s:.1} s"),
             None => "no scan was found in the map".to_owned(),
@@ -273,13 +264,15 @@ impl Counts {
             tracked,
             predicted,
             lost,
+            left_out,
+            ms_a_scan,
             ..
         } = self;
         let (scans, fixes) = (found + tracked + predicted + lost, found + tracked);
         let percent = 100.0 * fixes as f64 / scans.max(1) as f64;
         text += &format!("\n{fixes} of {scans} scans localised ({percent:.1} %): ");
         text += &format!("{found} found, {tracked} tracked; {predicted} predicted, {lost} lost");
-        if left_out > 0 {
+        if *left_out > 0 {
             text += &format!("; {left_out} more could not be used");
         }
         if !self.lost_scans.is_empty() {
@@ -291,7 +284,8 @@ impl Counts {
                 text += &format!(" and {more} more times");
             }
         }
-        text
+        let fixes = self.fixes.display();
+        text + &format!("\n{ms_a_scan:.1} ms a scan; {fixes}")
     }
 }
 
@@ -299,10 +293,15 @@ impl Counts {
 mod tests {
     use super::*;
 
-    fn counts(statuses: &[Status]) -> Counts {
+    fn figures(statuses: &[Status]) -> Figures {
         let scans = (0..).zip(statuses);
         let located = scans.map(|(k, status)| (k, k as i64 * 250_000_000, *status));
-        Counts::of(&located.collect::<Vec<_>>())
+        Figures {
+            left_out: 1,
+            ms_a_scan: 2.5,
+            fixes: FIXES.into(),
+            ..Figures::of(&located.collect::<Vec<_>>())
+        }
     }
 
     #[test]
@@ -311,10 +310,9 @@ mod tests {
         let drive = [Lost, Lost, Found, Tracked, Predicted, Lost, Found, Tracked];
         let expected = "first fix: scan 2, after 0.5 s\n\
             4 of 8 scans localised (50.0 %): 2 found, 2 tracked; 1 predicted, 3 lost; 1 more could not be used\n\
-            lost: scans 0 to 1, 5 to 5";
-        assert_eq!(counts(&drive).summary(1), expected);
-        let elsewhere = counts(&[Lost; 3]);
+            lost: scans 0 to 1, 5 to 5\n2.5 ms a scan; fixes.csv";
+        assert_eq!(figures(&drive).summary(), expected);
         let none = "no scan was found in the map\n0 of 3 scans localised (0.0 %)";
-        assert!(elsewhere.summary(0).starts_with(none));
+        assert!(figures(&[Lost; 3]).summary().starts_with(none));
     }
 }
