@@ -21,10 +21,9 @@ use gyre_transport::run::end_with;
 use rustix::process::Signal;
 
 use crate::{
-    arguments::RunArguments,
+    arguments::{RunArguments, resolve},
     earlier::{self, Earlier},
-    plan,
-    run::{self, resolve},
+    plan, run,
 };
 
 /// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.

@@ -14,7 +14,10 @@ use gyre_tools::{
 };
 use gyre_transport::{RunError, wake::Signals};
 
-use crate::{arguments::RunArguments, plan, preflight, run::resolve};
+use crate::{
+    arguments::{RunArguments, resolve},
+    plan, preflight,
+};
 
 /// The shape of the program's messages matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
@@ -68,12 +71,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         arguments,
     };
     let signals = Signals::install()?;
-    let mut observe = |what: &str| {
-        if !arguments.json {
-            print::note(format_args!("gyre: testing {what}"));
-        }
-    };
-    match check(&test, &signals, &mut observe) {
+    match check(&test, &signals) {
         Err(error) if matches!(error.downcast_ref(), Some(RunError::Stopped)) => Ok(None),
         report => report.map(Some),
     }

@@ -1,7 +1,5 @@
 //! `gyre run`: prepares a run, supervises it, writes its results.
 
-mod resolve;
-
 use std::{
     env,
     path::{Path, PathBuf},
@@ -30,7 +28,7 @@ use gyre_transport::{
 };
 
 use crate::{
-    arguments::RunArguments,
+    arguments::{RunArguments, resolve},
     earlier::{self, Begun, Earlier},
     notify::Notifier,
     plan,
@@ -38,8 +36,6 @@ use crate::{
     progress::Progress,
     simulate, waiting,
 };
-
-pub use resolve::resolve;
 
 const RECORDING: &str = "recording";
 

@@ -16,7 +16,10 @@ use gyre_tools::stress::{
     Others, Provenance, Report, StressArguments, TestedPipeline, report::Verdict,
 };
 
-use crate::{arguments::RunArguments, plan, preflight, run::resolve, simulate};
+use crate::{
+    arguments::{RunArguments, resolve},
+    plan, preflight, simulate,
+};
 
 /// The exit code without a verdict on the pipeline.
 const NOT_CARRIED_OUT: u8 = 2;

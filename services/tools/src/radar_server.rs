@@ -1,7 +1,6 @@
 //! `gyre radar-server`: plays a recording as a radar on the network, with injected faults where asked
 //! for.
 
-mod clients;
 mod output;
 
 use std::{

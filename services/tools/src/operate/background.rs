@@ -17,7 +17,7 @@ use gyre_contract::control::{Phase, Status};
 use gyre_results::SUMMARY;
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::operate::choice::{RunChoice, chosen_to_change};
+use crate::operate::{RunChoice, chosen_to_change};
 
 /// The environment variable of a run that is to leave the terminal that started it.
 const DETACHED: &str = "GYRE_DETACHED";

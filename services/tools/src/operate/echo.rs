@@ -11,7 +11,7 @@ use gyre_client::{AnyMessage, Next, Received, Run};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Message, Pose, Topic};
 
-use crate::operate::{choice::RunChoice, hz};
+use crate::operate::{RunChoice, hz};
 
 #[derive(Debug, Args)]
 pub struct EchoArguments {

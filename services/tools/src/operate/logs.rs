@@ -11,7 +11,7 @@ use gyre_configuration::{
 use gyre_recording::LogTail;
 use serde_json::Value;
 
-use crate::operate::choice::RunChoice;
+use crate::operate::RunChoice;
 
 #[derive(Debug, Args)]
 pub struct LogsArguments {

@@ -5,7 +5,7 @@ use gyre_client::{RunError, UsedRun, control::Control};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::control::{Activity, Phase, ProcessStatus, Received, Status};
 
-use crate::operate::choice::RunChoice;
+use crate::operate::RunChoice;
 
 #[derive(Debug, Args)]
 pub struct PsArguments {

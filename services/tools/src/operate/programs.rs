@@ -10,7 +10,7 @@ use gyre_contract::{
     run::StageConfig,
 };
 
-use crate::operate::choice::{RunChoice, chosen_to_change};
+use crate::operate::{RunChoice, chosen_to_change};
 
 #[derive(Debug, Args)]
 pub struct RestartArguments {

@@ -22,7 +22,7 @@ use ratatui::{
     crossterm::event::{self, Event, KeyCode, KeyModifiers},
 };
 
-use crate::operate::choice::{RunChoice, chosen};
+use crate::operate::{RunChoice, chosen};
 
 #[derive(Debug, Args)]
 pub struct TopArguments {

@@ -4,14 +4,14 @@
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Masked, Message, Motion, Scan};
 
-use super::Examination;
 use crate::conformance::{
+    Examination,
     report::Rule,
     session::{Pace, Session},
 };
 
 impl Examination<'_> {
-    pub(super) fn feedback(&mut self) -> Result<(), Failure> {
+    pub(crate) fn feedback(&mut self) -> Result<(), Failure> {
         if self.context.test.candidate.manifest.window.lag == 0 {
             return Ok(());
         }

@@ -10,8 +10,8 @@ use gyre_configuration::terminal::Failure;
 use gyre_contract::{Item, StageId, flag};
 use gyre_supervise::rig::{Process, Recorded};
 
-use super::Examination;
 use crate::conformance::{
+    Examination,
     report::Rule,
     session::{Pace, Session, Waited},
 };
@@ -22,7 +22,7 @@ const UNDER_WAY: u64 = 2;
 const DOES_NOT: &str = "it does not stand by: `gyre swap` needs --cold";
 
 impl Examination<'_> {
-    pub(super) fn restart(&mut self) -> Result<(), Failure> {
+    pub(crate) fn restart(&mut self) -> Result<(), Failure> {
         let end = self.context.reference.end();
         let (mut session, _) = self.begin("restart", Pace::Window, u64::MAX)?;
         session.until = end / 3 + UNDER_WAY;
@@ -40,7 +40,7 @@ impl Examination<'_> {
         resumes(&mut session, Rule::LooksBack, when, end)
     }
 
-    pub(super) fn standing_by(&mut self) -> Result<(), Failure> {
+    pub(crate) fn standing_by(&mut self) -> Result<(), Failure> {
         let mut session = Session::open(self.context, "standing-by", &mut self.findings)?;
         let root = &session.harness.rig.manifest().root;
         let ready = root.join(format!("{}.ready", session.stage().name()));

@@ -7,15 +7,15 @@ use gyre_configuration::terminal::Failure;
 use gyre_contract::{StageId, flag};
 use gyre_supervise::rig::Process;
 
-use super::Examination;
 use crate::conformance::{
+    Examination,
     report::Rule,
     result::result_bytes,
     session::{Pace, Session, Waited},
 };
 
 impl Examination<'_> {
-    pub(super) fn stream(&mut self) -> Result<bool, Failure> {
+    pub(crate) fn stream(&mut self) -> Result<bool, Failure> {
         let mut session = Session::open(self.context, "stream", &mut self.findings)?;
         let before = session.harness.rig.services();
         session.admit()?;
@@ -56,7 +56,7 @@ impl Examination<'_> {
     }
 
     /// The source: without a pose it sends the items of one window, and waits.
-    pub(super) fn window(&mut self) -> Result<(), Failure> {
+    pub(crate) fn window(&mut self) -> Result<(), Failure> {
         let end = self.context.reference.end() as usize;
         let (mut session, _) = self.begin("window", Pace::Hold, u64::MAX)?;
         let window = session.harness.rig.manifest().window.scans.min(end);
@@ -74,7 +74,7 @@ impl Examination<'_> {
 }
 
 impl Session<'_> {
-    pub(super) fn starts(&mut self) -> Result<bool, Failure> {
+    pub(crate) fn starts(&mut self) -> Result<bool, Failure> {
         let topic = self.output_topic();
         self.spawn(false)?;
         let limit = self.arguments().start_timeout_s;
@@ -173,7 +173,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
+    pub(crate) fn stops(&mut self, when: &str) -> Result<(), Failure> {
         let limit = self.arguments().stop_timeout_s;
         self.harness.process.iter().for_each(Process::terminate);
         self.pace = Pace::Hold;

@@ -6,13 +6,12 @@ use gyre_configuration::terminal::Failure;
 use gyre_contract::{Masked, Message, Motion, Pose, Rotation, Scan};
 use gyre_supervise::rig::Recorded;
 
-use super::Examination;
-use crate::conformance::{report::Rule, result::floats, session::Pace};
+use crate::conformance::{Examination, report::Rule, result::floats, session::Pace};
 
 const WRONG: u64 = 2;
 
 impl Examination<'_> {
-    pub(super) fn refusals(&mut self) -> Result<(), Failure> {
+    pub(crate) fn refusals(&mut self) -> Result<(), Failure> {
         let (reference, topics) = (self.context.reference, self.context.test.candidate.topics());
         for topic in topics.inputs() {
             let Some(valid) = reference.get(topic, WRONG) else {
@@ -24,7 +23,9 @@ impl Examination<'_> {
                 wrong.extend(later.map(|later| ("a sequence gap", later.clone())));
             }
             for (i, wrong) in wrong.iter().enumerate() {
-                (self.observe)(&format!("`{topic}` with {}", wrong.0));
+                self.context
+                    .test
+                    .announce(&format!("`{topic}` with {}", wrong.0));
                 // Each in a folder of its own, so that no state is kept from one to the next.
                 self.refusal(&format!("refusal-{topic}-{i}"), topic, wrong)?;
             }
