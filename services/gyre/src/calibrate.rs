@@ -16,7 +16,7 @@ use gyre_configuration::{
     with_stored_options,
 };
 use gyre_datasets::{DatasetOptions, ground_truth::read_trajectory};
-use gyre_geometry::{OwnedScan, SweepGeometry};
+use gyre_geometry::OwnedScan;
 use gyre_matching::odometry::Odometry;
 use gyre_radar::Trajectory;
 use gyre_results::{Content, Out, judgement::judge, truth_of};
@@ -145,15 +145,45 @@ impl Recorded {
     ) -> Result<Self, Failure> {
         let sensors = Sensor::read_all(&configuration, arguments)?;
         sensors::leave_out(&mut configuration.odometry);
-        let configuration = &configuration;
-        let (drive, geometry) = read(configuration, arguments)?;
-        let dataset = with_stored_options(configuration)?.dataset;
+        let Played { mut dataset, .. } = gyre_configuration::open(&configuration)?;
+        describe_masks_in_process(&configuration)?
+            .iter()
+            .for_each(print::note);
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        let mut drive = Drive::new(&configuration.odometry)?;
+        let played = configuration.source.played(dataset.scans());
+        let (all, count) = (played.len(), played.len().min(arguments.scans));
+        if count < all {
+            let sentence = format!(
+                "only the first {count} of {all} scans are used: --scans {all} takes them all"
+            );
+            if arguments.distance_m.is_some() {
+                return Err(format!("{sentence}, which --distance-m needs").into());
+            }
+            print::note(sentence);
+        }
+        let mut progress = Bar::new(Some(count));
+        for (done, number) in played.take(count).enumerate() {
+            let pushed = match dataset.read(number, scan.slot()) {
+                Ok(geometry) => {
+                    scan.geometry = geometry;
+                    drive.push(number, &scan).map_err(|error| error.to_string())
+                }
+                Err(error) => Err(error.to_string()),
+            };
+            if let Err(reason) = pushed {
+                progress.say(&format!("left out scan {number}: {reason}"));
+            }
+            progress.scans(done as u64, done as u64, "read".to_owned());
+        }
+        progress.finish();
+        let options = with_stored_options(&configuration)?.dataset;
         Ok(Self {
             name: configuration.data(),
             drive,
             configured: Configured {
-                geometry,
-                eccentricity_rad: dataset.azimuth_eccentricity_rad.unwrap_or(0.0).into(),
+                geometry: scan.geometry,
+                eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0).into(),
                 min_range_m: configuration.odometry.points.min_range_m.into(),
                 distance_m: arguments.distance_m,
             },
@@ -193,45 +223,6 @@ impl Recorded {
         storage::write(picture, svg(&study.drive, &study.calibration))?;
         Ok(study)
     }
-}
-
-/// Registers the scans of a recording, as many as are asked for at most.
-fn read(
-    configuration: &Configuration,
-    arguments: &CalibrateArguments,
-) -> Result<(Drive, SweepGeometry), Failure> {
-    let Played { mut dataset, .. } = gyre_configuration::open(configuration)?;
-    describe_masks_in_process(configuration)?
-        .iter()
-        .for_each(print::note);
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    let mut drive = Drive::new(&configuration.odometry)?;
-    let played = configuration.source.played(dataset.scans());
-    let (all, count) = (played.len(), played.len().min(arguments.scans));
-    if count < all {
-        let sentence =
-            format!("only the first {count} of {all} scans are used: --scans {all} takes them all");
-        if arguments.distance_m.is_some() {
-            return Err(format!("{sentence}, which --distance-m needs").into());
-        }
-        print::note(sentence);
-    }
-    let mut progress = Bar::new(Some(count));
-    for (done, number) in played.take(count).enumerate() {
-        let pushed = match dataset.read(number, scan.slot()) {
-            Ok(geometry) => {
-                scan.geometry = geometry;
-                drive.push(number, &scan).map_err(|error| error.to_string())
-            }
-            Err(error) => Err(error.to_string()),
-        };
-        if let Err(reason) = pushed {
-            progress.say(&format!("left out scan {number}: {reason}"));
-        }
-        progress.scans(done as u64, done as u64, "read".to_owned());
-    }
-    progress.finish();
-    Ok((drive, scan.geometry))
 }
 
 /// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.

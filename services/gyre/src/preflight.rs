@@ -21,7 +21,7 @@ use gyre_stages::{
     live_radar::{Settings, Sizes},
     radar_replay::{Listing, Player},
 };
-use gyre_tools::maps::localise::searched_map;
+use gyre_tools::maps::localise::localiser;
 use gyre_transport::Manifest;
 use rustix::process::{Resource, getrlimit};
 
@@ -72,7 +72,7 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
     }
     check_addresses(&[&configuration.gnss])?;
     if configuration.slam.is_localised() {
-        searched_map::open(&configuration.slam.map, configuration)?;
+        localiser(&configuration.slam.map, configuration)?;
     }
     let scans = match configuration.is_radar() {
         true => Scans::of_radar(configuration, ask)?,

@@ -1,7 +1,6 @@
 //! `gyre localise`: finds a drive in a map.
 
 mod scans;
-pub mod searched_map;
 
 use std::{
     fmt::Write,
@@ -25,7 +24,7 @@ use gyre_slam::{
 use gyre_storage::{self as storage, Draft};
 use serde::Serialize;
 
-use crate::bar::Bar;
+use crate::{bar::Bar, maps::folder};
 
 pub use scans::{RegisteredScan, Scans};
 
@@ -59,7 +58,7 @@ pub struct LocaliseArguments {
 /// If no scan was found, the error is returned after all files are written.
 pub fn localise(arguments: &LocaliseArguments) -> Result<(), Failure> {
     let configuration = arguments.inputs.configuration()?;
-    let mut localiser = searched_map::open(&arguments.map, &configuration)?;
+    let mut localiser = localiser(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;
     let _locked = Out::lock_for(out, Content::FIXES)?;
@@ -95,6 +94,31 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<(), Failure> {
             Err(format!("no scan of {data} was found in {map}: it may be of another place, or made with settings for another radar. If the first {FIRST} scans are not found, {PROBES} others over the drive are searched; source.first and source.scans choose a part").into())
         }
     }
+}
+
+/// Opens the map in a folder, and plans localisation in it.
+pub fn localiser(path: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
+    folder::settle(path)?;
+    let drawn = Map::open(path)?;
+    let map = KeptMap::open(path)
+        .map_err(|error| format!("{} cannot be localised in: {error}", path.display()))?;
+    let (path, drawn, kept) = (path.display(), drawn.keyframes(), map.keyframes().len());
+    if kept != drawn {
+        return Err(format!("{path} was drawn from {drawn} keyframes and keeps {kept}: draw the map again with gyre map").into());
+    }
+    plan(map, configuration)
+}
+
+pub fn plan(map: KeptMap, configuration: &Configuration) -> Result<Localiser, Failure> {
+    let odometry = &configuration.odometry;
+    let capacity = odometry.points.capacity;
+    if capacity == 0 {
+        return Err(
+            "points.capacity is 0, but scans are localised by their points: it must be 1 or more"
+                .into(),
+        );
+    }
+    Ok(Localiser::new(map, &odometry.refinement, capacity)?)
 }
 
 #[derive(Default)]

@@ -14,7 +14,7 @@ use gyre_slam::{
 use gyre_storage::StorageError;
 
 use super::{Lines, MapArguments, MapFormat};
-use crate::maps::{folder, localise::searched_map};
+use crate::maps::{folder, localise};
 
 /// Corrected keyframes, and the constraints between them.
 const GRAPH: &str = "graph.g2o";
@@ -94,7 +94,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     }
     let mut keyframes = super::open(run)?;
     let graph = read_graph(run, keyframes.len())?;
-    let mut localiser = searched_map::open(map, &super::configuration(run)?)?;
+    let mut localiser = localise::localiser(map, &super::configuration(run)?)?;
     let earlier = gyre_slam::mapping::Map::open(map)?;
     // Before the search, which takes minutes for a long drive. A drive that is refused makes no
     // folder.
