@@ -59,13 +59,11 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let played = gyre_configuration::open(&configuration)?;
     let period = Duration::from_nanos(played.dataset.period_ns().max(1) as u64);
     let checked = preflight::check(&configuration, &mut preflight::ask)?;
-    let file = out.join("config.toml");
-    fs::write(&file, configuration.to_toml()?)?;
+    fs::write(out.join("config.toml"), configuration.to_toml()?)?;
     let stages = StageId::ALL.into_iter();
     let turn = configuration.source.played(played.dataset.scans());
     let odometry = &configuration.odometry;
     let tested = TestedPipeline {
-        configuration: file,
         out: out.path().to_owned(),
         period,
         first_ns: played.dataset.nominal_stamp_ns(turn.start),
@@ -83,17 +81,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         shared_bytes: checked.footprint.total() as u64,
     };
     let provenance = provenance(arguments, &configuration)?;
-    let mut printed = Ok(());
-    let judged = &mut |verdict: &str| printed = print::line(verdict);
-    let note = &mut |line: &str| print::note(line);
-    let report = gyre_tools::stress::stress(&tested, arguments, provenance, note, judged)?;
-    report.write(out.path())?;
-    printed?;
-    print::line(format_args!(
-        "report in {}: report.json",
-        out.path().display()
-    ))?;
-    Ok(report)
+    gyre_tools::stress::stress(&tested, arguments, provenance)
 }
 
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {

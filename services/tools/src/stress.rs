@@ -77,8 +77,8 @@ fn stage(name: &str) -> Result<StageId, String> {
 
 #[derive(Clone, Debug)]
 pub struct TestedPipeline {
-    /// The resolved configuration, whose source is a recording.
-    pub configuration: PathBuf,
+    /// The folder of the report, with the resolved configuration, `config.toml`, whose source is a
+    /// recording.
     pub out: PathBuf,
     /// Time between two scans of the recording.
     pub period: Duration,

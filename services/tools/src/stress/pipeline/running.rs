@@ -165,7 +165,7 @@ fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
     let set = set.iter().chain(&setup.set);
     let named = [
         "run".to_owned(),
-        tested.configuration.display().to_string(),
+        tested.out.join("config.toml").display().to_string(),
         "--fresh".to_owned(),
         format!("--out={}", out.display()),
         format!("--rate={rate}"),
