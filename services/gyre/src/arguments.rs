@@ -15,6 +15,8 @@ use gyre_configuration::{
 use gyre_contract::run::{PlayedFrom, Rate};
 use gyre_results::{Form, absolute};
 use gyre_tools::{export::FrameArguments, operate::RunChoice};
+use gyre_transport::run::end_with;
+use rustix::process::Signal;
 
 use crate::run::results_folder;
 
@@ -59,9 +61,19 @@ pub struct RunOptions {
     /// another or of a live run.
     #[arg(long)]
     pub fresh: bool,
+    /// The process that has started it, and whose end also ends it (what `gyre batch` and `gyre
+    /// stress` start).
+    #[arg(long, hide = true)]
+    pub parent: Option<i32>,
 }
 
 impl RunOptions {
+    /// Lets this process end when its parent ends; false if that has ended already.
+    pub fn ends_with_parent(&self) -> Result<bool, Failure> {
+        let parent = self.parent;
+        Ok(parent.map_or(Ok(true), |parent| end_with(parent, Signal::TERM))?)
+    }
+
     pub fn form(&self) -> Form {
         match (self.json, self.verbose || !std::io::stdout().is_terminal()) {
             (true, _) => Form::Json,

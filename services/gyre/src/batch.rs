@@ -17,8 +17,6 @@ use gyre_configuration::{
 };
 use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
 use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
-use gyre_transport::run::end_with;
-use rustix::process::Signal;
 
 use crate::{
     arguments::{RunArguments, resolve},
@@ -142,8 +140,8 @@ fn sentence(rows: &[Row], earlier: usize) -> String {
 
 /// Computes a drive in a process of its own, unless it has been computed with the same
 /// configuration from the same scans, and prints its end.
-pub fn drive(parent: i32, run: &RunArguments) -> Result<ExitCode, Failure> {
-    if !end_with(parent, Signal::TERM)? {
+pub fn drive(run: &RunArguments) -> Result<ExitCode, Failure> {
+    if !run.options.ends_with_parent()? {
         return Ok(ExitCode::FAILURE);
     }
     let end =

@@ -62,13 +62,7 @@ pub enum Command {
     Batch(BatchArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
     #[command(hide = true, name = gyre_tools::batch::COMMAND)]
-    BatchDrive {
-        /// The process that has started it, and whose end also ends it.
-        #[arg(long)]
-        parent: i32,
-        #[command(flatten)]
-        run: RunArguments,
-    },
+    BatchDrive(RunArguments),
     /// Run the whole pipeline in the background. Returns when all its stages are there.
     Up(RunArguments),
     /// End a run in the background, and wait for its results.

@@ -74,7 +74,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Swap(arguments) => return gyre_tools::operate::swap(&arguments),
         Command::Shadow(arguments) => return gyre_tools::conformance::shadow::shadow(&arguments),
         Command::Batch(arguments) => return batch::batch(&arguments),
-        Command::BatchDrive { parent, run } => return batch::drive(parent, &run),
+        Command::BatchDrive(arguments) => return batch::drive(&arguments),
         Command::Stress(arguments) => return stress::stress(&arguments),
         Command::Record(arguments) => return record::record(&arguments),
         #[cfg(feature = "link")]

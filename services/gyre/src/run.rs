@@ -43,6 +43,9 @@ const RECORDING: &str = "recording";
 /// resumed; if it only lacks results, the results are written.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     detach_if_asked();
+    if !arguments.options.ends_with_parent()? {
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
     let configuration = resolve(arguments)?;
     #[cfg(feature = "link")]
     if configuration.link.side.is_some() {

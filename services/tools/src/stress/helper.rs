@@ -1,5 +1,4 @@
-//! Child processes that load the machine or take part in a measurement:
-//! `gyre stress-helper PARENT WORK`.
+//! Child processes that load the machine: `gyre stress-helper PARENT WORK`.
 //!
 //! A helper ends with the process that has started it, even if that is killed.
 
@@ -7,7 +6,6 @@ use std::{
     fs,
     hint::black_box,
     io::{BufRead, BufReader},
-    os::unix::process::CommandExt,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     thread,
@@ -39,8 +37,6 @@ const PAUSE: Duration = Duration::from_millis(20);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Work {
-    /// Becomes `gyre` with these arguments, and ends its stages first.
-    Run(Vec<String>),
     Spin,
     /// Takes this share of the available memory, and churns it.
     Memory(f64),
@@ -55,35 +51,14 @@ pub fn help(arguments: &[String]) -> Result<(), Failure> {
     };
     let parent = parent.parse().map_err(|_| usage())?;
     let work: Work = serde_json::from_str(work).map_err(|_| usage())?;
-    // A run has shared memory of its own: it ends itself, and removes that memory.
-    let signal = match &work {
-        Work::Run(_) => Signal::TERM,
-        _ => Signal::KILL,
-    };
-    if !end_with(parent, signal)? {
+    if !end_with(parent, Signal::KILL)? {
         return Err("interrupted".into());
     }
     match work {
-        Work::Run(words) => {
-            let error = Command::new(own()).args(words).exec();
-            Err(format!("cannot start a run: {error}").into())
-        }
         Work::Spin => spin(),
         Work::Memory(share) => churn(share),
         Work::Observe(out) => observe(&out),
     }
-}
-
-pub fn spawn(work: &Work, output: Stdio, errors: Stdio) -> Result<Child, Failure> {
-    let spawned = Command::new(own())
-        .arg(COMMAND)
-        .arg(std::process::id().to_string())
-        .arg(serde_json::to_string(work)?)
-        .stdin(Stdio::null())
-        .stdout(output)
-        .stderr(errors)
-        .spawn();
-    Ok(spawned.map_err(|error| format!("cannot start a helper process: {error}"))?)
 }
 
 /// A helper process. It is killed when this is dropped.
@@ -96,7 +71,15 @@ pub struct Helper {
 impl Helper {
     /// Starts a helper, and waits until it works.
     pub fn start(work: Work) -> Result<Self, Failure> {
-        let mut process = spawn(&work, Stdio::piped(), Stdio::inherit())?;
+        let spawned = Command::new(own())
+            .arg(COMMAND)
+            .arg(std::process::id().to_string())
+            .arg(serde_json::to_string(&work)?)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn();
+        let mut process =
+            spawned.map_err(|error| format!("cannot start a helper process: {error}"))?;
         let mut line = String::new();
         let output = process.stdout.take().map(BufReader::new);
         let read = output.map(|mut output| output.read_line(&mut line));
