@@ -78,17 +78,13 @@ impl<'a> Shadowing<'a> {
         record: Record,
     ) -> Result<Self, RunError> {
         let now = Instant::now();
-        let candidate = &program.candidate;
-        let (topics, out) = (candidate.topics(), candidate.manifest.out.display());
-        let (command, stage) = (candidate.command.join(" "), candidate.stage);
-        let observation = Observation::of(run, stage, &topics)?;
-        say(format_args!("`{command}` beside {} of {out}", stage.name()));
+        let (stage, topics) = (program.candidate.stage, program.candidate.topics());
         Ok(Self {
             arguments,
             program,
             signals,
             topic: topics.output,
-            observation,
+            observation: Observation::of(run, stage, &topics)?,
             taken: now,
             backlog: VecDeque::new(),
             life: None,
@@ -104,11 +100,17 @@ impl<'a> Shadowing<'a> {
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
     pub(crate) fn run(mut self) -> Result<Record, Failure> {
         let began = Instant::now();
+        let program = &self.program.candidate;
+        let (command, out) = (program.command.join(" "), program.manifest.out.display());
+        let stage = program.stage.name();
+        let mut begins = Some(format!("`{command}` beside {stage} of {out}"));
         loop {
             // Before the poll: the messages before the end are still in the queues.
             let has_ended = self.observation.has_ended();
             self.take(has_ended)?;
             self.attend()?;
+            // A program that cannot be started is reported by the error alone.
+            begins.take().into_iter().for_each(say);
             let (limit, scans) = (self.arguments.duration, self.arguments.scans);
             let is_over = limit.is_some_and(|limit| began.elapsed() >= limit);
             let has_enough = scans.is_some_and(|scans| self.record.counts.compared >= scans);
