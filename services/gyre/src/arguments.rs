@@ -1,6 +1,10 @@
 //! The arguments that several commands share, and the arguments of optional commands.
 
-use std::{io::IsTerminal, path::PathBuf, time::Duration};
+use std::{
+    io::IsTerminal,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use clap::{Args, Subcommand};
 use gyre_configuration::{
@@ -17,8 +21,6 @@ use gyre_results::{Form, absolute};
 use gyre_tools::{export::FrameArguments, operate::RunChoice};
 use gyre_transport::run::end_with;
 use rustix::process::Signal;
-
-use crate::run::results_folder;
 
 #[derive(Default, Debug, Args)]
 pub struct RunArguments {
@@ -92,6 +94,25 @@ impl RunArguments {
             false => Ok(given),
         }
     }
+}
+
+pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
+    if let Some(out) = &arguments.options.out {
+        return Ok(out.clone());
+    }
+    let given = arguments.given()?;
+    let data = given.data.and_then(|data| data.canonicalize().ok());
+    let name = match &given.configuration {
+        Some(file) => file.file_stem(),
+        None if given.radar.is_some() || arguments.ros2.is_some() => Some("radar".as_ref()),
+        None => data.as_deref().and_then(|data| {
+            match gyre_recording::is_recording(data) || data.is_file() {
+                true => data.file_stem(),
+                false => data.file_name(),
+            }
+        }),
+    };
+    Ok(Path::new("out").join(name.unwrap_or_default()))
 }
 
 /// Returns the configuration of a run, with the overrides of the command line.

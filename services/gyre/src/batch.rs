@@ -19,7 +19,7 @@ use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
 use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
 
 use crate::{
-    arguments::{RunArguments, resolve},
+    arguments::{RunArguments, resolve, results_folder},
     earlier::{self, Earlier},
     plan, run,
 };
@@ -165,7 +165,7 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
         )
         .into());
     }
-    let (folder, deadline) = (run::results_folder(arguments)?, Instant::now() + ENDING);
+    let (folder, deadline) = (results_folder(arguments)?, Instant::now() + ENDING);
     let out = loop {
         match Out::lock(&folder) {
             Err(OutError::Held(_)) if Instant::now() < deadline => thread::sleep(LOOK),

@@ -8,6 +8,8 @@ pub mod calibrate;
 pub mod cli;
 pub mod conformance;
 pub mod earlier;
+#[cfg(not(all(feature = "link", feature = "ros2")))]
+mod features;
 pub mod inspect;
 #[cfg(feature = "link")]
 pub mod link;
@@ -27,7 +29,7 @@ pub mod watch;
 
 use std::{path::PathBuf, process::ExitCode};
 
-use arguments::{RunArguments, RunOptions};
+use arguments::{RunArguments, RunOptions, results_folder};
 use cli::Command;
 use gyre_configuration::{
     Configuration, schema,
@@ -39,7 +41,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     set_up_process(&command)?;
     let done = match command {
         Command::New { what } => gyre_tools::new::new(&what),
-        Command::Up(arguments) => gyre_tools::operate::up(&run::results_folder(&arguments)?),
+        Command::Up(arguments) => gyre_tools::operate::up(&results_folder(&arguments)?),
         Command::Down(run) => gyre_tools::operate::down(&run),
         Command::Ps(arguments) => gyre_tools::operate::ps(&arguments),
         Command::Logs(arguments) => gyre_tools::operate::logs(&arguments),
@@ -50,10 +52,10 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         #[cfg(feature = "ros2")]
         Command::Ros2(arguments) => ros2::publish(&arguments),
         #[cfg(not(feature = "ros2"))]
-        Command::Ros2(_) => Err(absent("ROS 2").into()),
+        Command::Ros2(_) => Err(features::absent("ROS 2").into()),
         Command::StressHelper { words } => gyre_tools::stress::helper::help(&words),
         #[cfg(not(feature = "link"))]
-        Command::Link { .. } => Err(absent(LINK).into()),
+        Command::Link { .. } => Err(features::absent(features::LINK).into()),
         Command::RadarServer(arguments) => gyre_tools::radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Report(arguments) => gyre_tools::report::report(&arguments),
@@ -87,17 +89,6 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         }
     };
     done.map(|()| ExitCode::SUCCESS)
-}
-
-#[cfg(not(feature = "link"))]
-const LINK: &str = "zenoh, which links machines";
-
-/// Returns why a part of Gyre is refused that a build without `--features full` lacks.
-#[cfg(not(all(feature = "link", feature = "ros2")))]
-fn absent(part: &str) -> String {
-    format!(
-        "this gyre was built without {part}: build it with `cargo run --release --locked --features full -- ...`, or install its package or container"
-    )
 }
 
 /// The files of a command are its user's alone: all but a simulated recording. The umask of a child

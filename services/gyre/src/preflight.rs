@@ -245,7 +245,7 @@ fn check_link(link: &LinkConfig) -> Result<(), Failure> {
         return Ok(());
     }
     #[cfg(not(feature = "link"))]
-    return Err(crate::absent(crate::LINK).into());
+    return Err(crate::features::absent(crate::features::LINK).into());
     #[cfg(feature = "link")]
     gyre_link::check(link).map_err(|error| format!("[link]: {error}").into())
 }
@@ -259,7 +259,7 @@ pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
             Ok(ask(&Settings::of(source, options)?)?)
         }
         #[cfg(not(feature = "ros2"))]
-        SourceKind::Ros2 => Err(crate::absent("ROS 2").into()),
+        SourceKind::Ros2 => Err(crate::features::absent("ROS 2").into()),
         _ => Ok(gyre_stages::live_radar::ask(&Settings::of(
             source, options,
         )?)?),

@@ -2,7 +2,6 @@
 
 use std::{
     env,
-    path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -28,7 +27,7 @@ use gyre_transport::{
 };
 
 use crate::{
-    arguments::{RunArguments, resolve},
+    arguments::{RunArguments, resolve, results_folder},
     earlier::{self, Begun, Earlier},
     notify::Notifier,
     plan,
@@ -88,25 +87,6 @@ pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
     if configuration.stored().is_some() {
         configuration.source.data = out.join(RECORDING);
     }
-}
-
-pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
-    if let Some(out) = &arguments.options.out {
-        return Ok(out.clone());
-    }
-    let given = arguments.given()?;
-    let data = given.data.and_then(|data| data.canonicalize().ok());
-    let name = match &given.configuration {
-        Some(file) => file.file_stem(),
-        None if given.radar.is_some() || arguments.ros2.is_some() => Some("radar".as_ref()),
-        None => data.as_deref().and_then(|data| {
-            match gyre_recording::is_recording(data) || data.is_file() {
-                true => data.file_stem(),
-                false => data.file_name(),
-            }
-        }),
-    };
-    Ok(Path::new("out").join(name.unwrap_or_default()))
 }
 
 /// The inputs of a run that its configuration does not have.

@@ -1,5 +1,5 @@
-//! `gyre radar-server`: plays a recording as a radar on the network, with injected faults where asked
-//! for.
+//! `gyre radar-server`: plays a recording as a radar on the network, with injected faults where
+//! asked for.
 
 mod output;
 

@@ -314,8 +314,8 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The messages that are fed to the process: its inputs as they are admitted, and the feedback of the
-/// rest of the run to its answers.
+/// The messages that are fed to the process: its inputs as they are admitted, and the feedback of
+/// the rest of the run to its answers.
 impl Session<'_> {
     /// Sends the feedback of the rest of the run to an item.
     fn answered(&mut self, seq: u64) -> Result<(), RunError> {
