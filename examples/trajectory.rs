@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dataset = gyre_datasets::open(Path::new(folder), &config.dataset)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config.odometry)?;
-    let sensors = config.odometry.sensors();
+    let sensors = config.odometry.sensors.sampled();
     let samples = ScanSamples::open(&sensors, Path::new(folder), dataset.as_mut())?;
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for index in 0..dataset.len() {

@@ -9,12 +9,12 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
 };
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion};
+use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, samples::SensorConfigs};
 use gyre_journal::{
     self as journal, Journal,
     checkpoint::{self, Checkpoint},
 };
-use gyre_matching::{RefinementConfig, Refiner};
+use gyre_matching::{RefinementConfig, Refiner, Searched};
 use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 
 use crate::recordings::folder;
@@ -120,13 +120,19 @@ fn points() -> Vec<SparsePoint> {
 
 /// Restores the state after the last item, and refines one more.
 fn use_map(file: &Path) -> Result<(), Failure> {
-    let mut refiner = Refiner::new(&config(), POINTS)?;
+    let mut refiner = Refiner::new(&config(), &SensorConfigs::default(), POINTS)?;
     let cells = refiner.keyframe_cells();
     let mut checkpoint = Checkpoint::open(file, 4, config().keyframes, cells)?;
     checkpoint.newest_known(&[pose(3), pose(2)])?;
     checkpoint.restore(3, &mut refiner)?;
     let points = points();
-    refiner.refine(4, &points, &points, &Pose::translation(2.0, 0.0), 0.25);
+    refiner.refine(&Searched::by_radar(
+        4,
+        &points,
+        &points,
+        &Pose::translation(2.0, 0.0),
+        0.25,
+    ));
     Ok(checkpoint.write(4, 0, &refiner)?)
 }
 
@@ -134,12 +140,12 @@ fn use_map(file: &Path) -> Result<(), Failure> {
 fn refinement_maps() {
     let (target, folder) = (Target::new(96), folder());
     let file = checkpoint::path(folder.path());
-    let mut drive = Refiner::new(&config(), POINTS).unwrap();
+    let mut drive = Refiner::new(&config(), &SensorConfigs::default(), POINTS).unwrap();
     let cells = drive.keyframe_cells();
     let mut checkpoint = Checkpoint::open(&file, 4, config().keyframes, cells).unwrap();
     let (points, motion) = (points(), Pose::translation(2.0, 0.0));
     for item in 0..4 {
-        drive.refine(item, &points, &points, &motion, 0.25);
+        drive.refine(&Searched::by_radar(item, &points, &points, &motion, 0.25));
         checkpoint.write(item, 0, &drive).unwrap();
     }
     drop(checkpoint);

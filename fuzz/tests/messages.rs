@@ -7,11 +7,11 @@ use gyre_contract::{
     MaskedHeader, MotionEstimate, MotionHeader, PoseHeader, RotationEstimate, ScanHeader, compose,
 };
 use gyre_fuzz::{Failure, Target, edit::Number};
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{SparsePoint, samples::SensorConfigs};
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_matching::{
     ExhaustiveConfig, ExhaustiveSearch, MotionMatch, RefinementConfig, Refiner, RotationConfig,
-    SequentialRotation, TranslationConfig, TranslationSearch,
+    Searched, SequentialRotation, TranslationConfig, TranslationSearch,
 };
 use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_stages::estimates;
@@ -248,7 +248,7 @@ fn motions_and_points() {
         keyframes: 3,
         ..RefinementConfig::default()
     };
-    let refiner = Mutex::new(Refiner::new(&config, POINTS).unwrap());
+    let refiner = Mutex::new(Refiner::new(&config, &SensorConfigs::default(), POINTS).unwrap());
     check!()
         .with_type::<([MaskedMessage; 2], Vec<Number>, Number, bool)>()
         .for_each(|([now, then], numbers, interval, reset)| {
@@ -267,7 +267,8 @@ fn motions_and_points() {
                 }
                 let interval_s = header.motion.interval_ns as f64 * 1e-9;
                 let motion = header.motion.motion().motion;
-                let refined = refiner.refine(1, later, earlier, &motion, interval_s);
+                let refined =
+                    refiner.refine(&Searched::by_radar(1, later, earlier, &motion, interval_s));
                 let refined = MotionHeader {
                     motion: estimates::refined(&header.motion, &refined),
                     ..header

@@ -46,7 +46,7 @@ impl Config {
         resolve(&mut table).map_err(errors::config)?;
         let method = MethodConfig::take(&mut table).map_err(errors::config)?;
         if let Some(key) = table.keys().next() {
-            let unknown = strict::unknown("the configuration", key, MethodConfig::SECTIONS);
+            let unknown = strict::unknown("the configuration", key, &MethodConfig::sections());
             return Err(errors::config(unknown));
         }
         MethodConfig::check(&method.odometry, &method.gnss).map_err(errors::config)?;

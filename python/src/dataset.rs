@@ -39,9 +39,9 @@ pub fn open(
         let found = || radar_constants(&data, &DatasetOptions::default());
         let options = options.map_or_else(found, Ok).map_err(errors::automatic)?;
         let mut scans = gyre_recording::open(&data, &options).map_err(errors::open)?;
-        let samples = ScanSamples::open(&method.odometry.sensors(), &data, scans.as_mut());
+        let samples = ScanSamples::open(&method.odometry.sensors.sampled(), &data, scans.as_mut());
         let samples = samples.map_err(errors::log)?;
-        if method.odometry.doppler.is_used() {
+        if method.odometry.sensors.doppler.is_used() {
             check_first_scan(scans.as_mut()).map_err(errors::doppler)?;
         }
         Ok(Opened { scans, samples })

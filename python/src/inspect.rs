@@ -22,7 +22,7 @@ pub fn inspect(
     let options = method.dataset;
     let logs = InspectedLogs {
         gnss_topic: method.gnss.topic,
-        m_per_tick: method.odometry.wheels.m_per_tick,
+        m_per_tick: method.odometry.sensors.wheels.m_per_tick,
     };
     let trajectory = trajectory.map(|it| &it.get().0);
     let report = py.detach(|| {

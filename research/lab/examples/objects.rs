@@ -107,7 +107,7 @@ fn registered(
 ) -> Outcome<Vec<DriveScan>> {
     let mut odometry = Odometry::new(config)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
-    let samples = ScanSamples::open(&config.sensors(), folder, dataset)?;
+    let samples = ScanSamples::open(&config.sensors.sampled(), folder, dataset)?;
     let mut drive = Vec::new();
     for index in 0..dataset.len() {
         scan.geometry = dataset.read(index, scan.slot())?;

@@ -144,7 +144,7 @@ impl Recorded {
         arguments: &CalibrateArguments,
     ) -> Result<Self, Failure> {
         let sensors = Sensor::read_all(&configuration, arguments)?;
-        sensors::leave_out(&mut configuration.odometry);
+        sensors::leave_out(&mut configuration.odometry.sensors);
         let Played { mut dataset, .. } = gyre_configuration::open(&configuration)?;
         describe_masks_in_process(&configuration)?
             .iter()
@@ -228,7 +228,7 @@ impl Recorded {
 /// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.
 fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f64; 2]> {
     let mut configuration = arguments.inputs.configuration().ok()?;
-    sensors::leave_out(&mut configuration.odometry);
+    sensors::leave_out(&mut configuration.odometry.sensors);
     let truth = read_trajectory(&truth_of(&configuration, &arguments.out)?).ok()?;
     let before = ate_m(&configuration, arguments.scans, &truth).ok()?;
     let file: ::toml::Table = toml(found).parse().ok()?;

@@ -16,6 +16,7 @@ use gyre_contract::{
     StageId,
     run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side},
 };
+use gyre_geometry::samples::SensorConfigs;
 use gyre_journal::{
     self as journal, Content,
     checkpoint::{self, Checkpoint},
@@ -286,7 +287,8 @@ fn known_poses(
                 &configuration.odometry.points,
                 &configuration.odometry.refinement,
             );
-            let cells = Refiner::new(refinement, points.capacity)?.keyframe_cells();
+            let cells = Refiner::new(refinement, &SensorConfigs::default(), points.capacity)?
+                .keyframe_cells();
             let window = configuration.run.window;
             let mut map = Checkpoint::open(&path, window, refinement.keyframes, cells)?;
             let poses = content.last.iter().rev();

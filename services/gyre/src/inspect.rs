@@ -35,7 +35,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<(), Failure> {
     let dataset = gyre_recording::open(&path, &options)?;
     let logs = InspectedLogs {
         gnss_topic: configuration.gnss.topic,
-        m_per_tick: configuration.odometry.wheels.m_per_tick,
+        m_per_tick: configuration.odometry.sensors.wheels.m_per_tick,
     };
     let report =
         gyre_datasets::inspect_dataset(&path, dataset, &options, &logs, trajectory.as_ref());

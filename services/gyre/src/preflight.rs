@@ -210,7 +210,7 @@ impl Scans {
     fn of_radar(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Self, Failure> {
         let is_in_ros2 = configuration.source.kind == SourceKind::Ros2;
         let odometry = &configuration.odometry;
-        for sensor in odometry.sensors() {
+        for sensor in odometry.sensors.sampled() {
             let comes = match sensor.kind() {
                 SensorKind::None | SensorKind::Udp => true,
                 SensorKind::Ros2 => is_in_ros2,
@@ -224,10 +224,10 @@ impl Scans {
                 .into());
             }
         }
-        if odometry.doppler.is_used() {
+        if odometry.sensors.doppler.is_used() {
             return Err("doppler.kind is `auto`, but a live radar does not report which of its chirps rise: set it to `none`".into());
         }
-        check_addresses(&odometry.sensors())?;
+        check_addresses(&odometry.sensors.sampled())?;
         configuration.dataset.check()?;
         let radar = ask(configuration)?;
         Ok(Self {

@@ -16,7 +16,6 @@ use gyre_contract::{
     run::{SourceConfig, SourceKind, StageConfig, StageCounters},
 };
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::samples::{GyroConfig, WheelsConfig};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, launch};
 use gyre_stages::{
@@ -157,9 +156,8 @@ fn play(launch: &Launch) -> Result<StageCounters, RunError> {
     let options: DatasetOptions = launch.section("dataset")?;
     let drive = SimulatedDrive::new(&simulation).map_err(|error| input(&error))?;
     let mut dataset = drive.open(&options).map_err(|error| input(&error))?;
-    let gyro: GyroConfig = launch.section("gyro")?;
-    let wheels: WheelsConfig = launch.section("wheels")?;
-    let samples = simulated_samples(&drive, &[&gyro, &wheels], dataset.as_mut());
+    let sensors = launch.sensors()?;
+    let samples = simulated_samples(&drive, &sensors.sampled(), dataset.as_mut());
     let samples = samples.map_err(|error| input(&*error))?;
     gyre_stages::radar_replay::play(launch, dataset, samples, Pace::OnDemand)
 }

@@ -6,7 +6,7 @@ use gyre_configuration::{
     Configuration,
     terminal::{Failure, own, print},
 };
-use gyre_contract::{StageId, run::Scenario};
+use gyre_contract::{StageId, Witness, run::Scenario};
 use gyre_matching::RefinementKind;
 use gyre_results::{
     Content, Out,
@@ -69,11 +69,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         first_ns: played.dataset.nominal_stamp_ns(turn.start),
         turn,
         others: Others {
-            used: [
-                odometry.gyro.is_used(),
-                odometry.wheels.is_used(),
-                odometry.doppler.is_used(),
-            ],
+            used: Witness::ALL.map(|kind| odometry.sensors.is_used(kind)),
             are_weighed: odometry.refinement.kind != RefinementKind::None,
         },
         stages: stages.filter(|stage| configuration.has(*stage)).collect(),

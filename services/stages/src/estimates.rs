@@ -83,7 +83,7 @@ fn record(refined: &Refined) -> RefinementRecord {
         overlap: refined.overlap,
         support: refined.support,
         stationary: refined.stationary.into(),
-        witnesses: [refined.gyro, refined.wheels, refined.doppler].map(witness),
+        witnesses: refined.witnesses.map(witness),
     }
 }
 
@@ -102,5 +102,7 @@ fn witness(witnessed: Option<Witnessed>) -> WitnessRecord {
         scale_sigma: of.scale_sigma,
         bias: of.bias,
         bias_sigma: of.bias_sigma,
+        delay_s: of.delay_s,
+        delay_sigma_s: of.delay_sigma_s,
     }
 }

@@ -9,7 +9,10 @@ mod python;
 mod scans;
 
 use gyre_contract::{Item, Masked, MaskedHeader, StageId, flag, mask_kind, run::StageCounters};
-use gyre_geometry::{LostAzimuths, Twist, samples::DopplerConfig};
+use gyre_geometry::{
+    LostAzimuths, Twist,
+    samples::{DopplerConfig, Witness},
+};
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_radar::{
     DopplerEstimator, LostAzimuthFinder, PlacedRows, PointsConfig, RasterConfig, lost::stale_rows,
@@ -115,14 +118,13 @@ impl Stage for Masking {
         // Of the scan alone, so that a restart changes nothing.
         let velocity = self.doppler.as_mut().map(|doppler| {
             let velocity = doppler.estimate(&sweep.scan, self.min_range_m);
-            velocity.ok()
+            velocity.unwrap_or_default()
         });
         *header = self.header(twist, points);
         let azimuths = scan.header().azimuths as usize;
         header.azimuth_variance_rad2 = self.azimuths.last().variance_of_mean_rad2(azimuths);
-        (header.gyro, header.has_gyro) = or_none(input.turn);
-        (header.wheels, header.has_wheels) = or_none(input.distance);
-        (header.doppler, header.has_doppler) = or_none(velocity.flatten());
+        header.evidence = input.evidence;
+        header.evidence[Witness::Doppler as usize] = velocity.unwrap_or_default();
         Ok(())
     }
 
@@ -150,11 +152,6 @@ impl Masking {
             ..MaskedHeader::default()
         }
     }
-}
-
-/// Returns a measurement as a message has it: zeros without one, and whether there is one.
-fn or_none<T: Copy + Default>(measured: Option<T>) -> (T, u64) {
-    (measured.unwrap_or_default(), measured.is_some().into())
 }
 
 /// Returns a scan whose rows are at their places.

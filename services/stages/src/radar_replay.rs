@@ -15,7 +15,6 @@ use gyre_contract::{
     run::{PlayedFrom, SourceConfig, StageCounters},
 };
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
-use gyre_geometry::samples::{GyroConfig, WheelsConfig};
 use gyre_stage::{
     Launch, Source,
     source::{self, Unreadable},
@@ -54,9 +53,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
         opened => opened.map_err(|error| error.to_string()),
     };
     let mut dataset = source::open(launch, &config, open)?;
-    let (gyro, wheels): (GyroConfig, WheelsConfig) =
-        (launch.section("gyro")?, launch.section("wheels")?);
-    let samples = ScanSamples::open(&[&gyro, &wheels], &config.data, dataset.as_mut());
+    let sensors = launch.sensors()?;
+    let samples = ScanSamples::open(&sensors.sampled(), &config.data, dataset.as_mut());
     let samples = samples.map_err(RunError::input)?;
     play(launch, dataset, samples, Pace::Sensor)
 }

@@ -1,12 +1,11 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
 use gyre_contract::{Item, Masked, Motion, Refined, StageId, flag, run::StageCounters};
-use gyre_geometry::samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_journal::{
     checkpoint::{self, Checkpoint},
     continue_when_full,
 };
-use gyre_matching::{Aiding, RefinementConfig, Refiner};
+use gyre_matching::{RefinementConfig, Refiner, Searched};
 use gyre_radar::PointsConfig;
 use gyre_stage::{
     Launch, Stage,
@@ -20,12 +19,8 @@ use crate::{estimates, points, unusable};
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
-    let gyro: GyroConfig = launch.section("gyro")?;
-    let wheels: WheelsConfig = launch.section("wheels")?;
-    let doppler: DopplerConfig = launch.section("doppler")?;
-    let refiner = Refiner::new(&config, points.capacity)
-        .map_err(RunError::input)?
-        .with_sensors(&gyro, &wheels, &doppler);
+    let refiner = Refiner::new(&config, &launch.sensors()?, points.capacity);
+    let refiner = refiner.map_err(RunError::input)?;
     launch.take_place()?;
     let manifest = &launch.manifest;
     if manifest.live {
@@ -65,20 +60,16 @@ impl Stage for RefinementStage {
         output.header().motion = match input.pair.previous {
             Some(previous) if !item.is(flag::BREAK) => {
                 let (masked, before) = (input.pair.current.header(), previous.header());
-                self.refiner.aiding = Aiding {
+                let refined = self.refiner.refine(&Searched {
+                    scan: item.seq,
+                    later: points(input.pair.current)?,
+                    earlier: points(previous)?,
+                    motion: motion.motion().motion,
+                    interval_s: motion.interval_ns as f64 * 1e-9,
                     azimuth_variance_rad2: before.azimuth_variance_rad2
                         + masked.azimuth_variance_rad2,
-                    turn: masked.turn(),
-                    distance: masked.distance(),
-                    velocities: [before.velocity(), masked.velocity()],
-                };
-                let refined = self.refiner.refine(
-                    item.seq,
-                    points(input.pair.current)?,
-                    points(previous)?,
-                    &motion.motion().motion,
-                    motion.interval_ns as f64 * 1e-9,
-                );
+                    evidence: [&before.evidence, &masked.evidence],
+                });
                 estimates::refined(&motion, &refined)
             }
             _ => motion,

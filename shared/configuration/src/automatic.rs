@@ -94,7 +94,8 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     let mut table = parsed
         .map_err(|error| ConfigurationError(format!("the recording's configuration: {error}")))?;
     // The recording itself describes its scans.
-    table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
+    let sections = MethodConfig::sections();
+    table.retain(|section, _| section != "dataset" && sections.contains(&section));
     let gnss = table.get_mut("gnss").and_then(Value::as_table_mut);
     let is_beside = |gnss: &&mut Table| {
         let kind = gnss.get("kind").and_then(Value::as_str);

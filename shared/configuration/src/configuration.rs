@@ -153,7 +153,11 @@ impl Configuration {
             simulation.output.format = simulation.output.format.or(format);
         }
         configuration.leave_masks_to_python();
-        let known = [&MethodConfig::SECTIONS_OF_A_RUN[..], MethodConfig::SECTIONS].concat();
+        let known = [
+            &MethodConfig::SECTIONS_OF_A_RUN[..],
+            &MethodConfig::sections(),
+        ]
+        .concat();
         match table.keys().next() {
             None => Ok(configuration),
             Some(key) => Err(strict::unknown("the configuration", key, &known)),

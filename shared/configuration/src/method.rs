@@ -1,7 +1,7 @@
 //! The settings that decide the computed result.
 
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::samples::GnssConfig;
+use gyre_geometry::samples::{GnssConfig, SensorConfig as _, SensorConfigs, Witness};
 use gyre_matching::odometry::OdometryConfig;
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
@@ -10,7 +10,7 @@ use toml::Table;
 
 use crate::{
     ConfigurationError,
-    strict::{section, within},
+    strict::{read, section, value, within},
 };
 
 /// The sections of a configuration that decide the result and the radar; its file may have other
@@ -29,9 +29,11 @@ pub struct MethodConfig {
 /// checked.
 macro_rules! sections {
     (checked: $($checked:ident)*; unchecked: $($unchecked:ident)*; others: $($other:ident)*) => {
-        pub const SECTIONS: &[&str] = &[
-            $(stringify!($checked),)* $(stringify!($unchecked),)* $(stringify!($other),)*
-        ];
+        pub fn sections() -> Vec<&'static str> {
+            let checked = &[$(stringify!($checked),)*][..];
+            let others = &[$(stringify!($unchecked),)* $(stringify!($other),)*];
+            [checked, &Witness::ALL.map(Witness::name), others].concat()
+        }
 
         /// Takes the sections out of a configuration; those that are missing have their defaults.
         pub fn take(table: &mut Table) -> Result<Self, ConfigurationError> {
@@ -39,6 +41,7 @@ macro_rules! sections {
                 odometry: OdometryConfig {
                     $($checked: section(table, stringify!($checked))?,)*
                     $($unchecked: section(table, stringify!($unchecked))?,)*
+                    sensors: sensors(table)?,
                 },
                 $($other: section(table, stringify!($other))?,)*
             })
@@ -46,14 +49,15 @@ macro_rules! sections {
 
         pub fn check(odometry: &OdometryConfig, gnss: &GnssConfig) -> Result<(), ConfigurationError> {
             $(within(stringify!($checked), odometry.$checked.validate())?;)*
-            within("gnss", gnss.validate())
+            let sensors = odometry.sensors.validate().and_then(|()| gnss.validate());
+            sensors.map_err(|error| value(error.section, error))
         }
     };
 }
 
 impl MethodConfig {
     sections! {
-        checked: raster points masking rotation translation refinement gyro wheels doppler;
+        checked: raster points masking rotation translation refinement;
         unchecked: search exhaustive;
         others: dataset slam gnss objects
     }
@@ -68,4 +72,18 @@ impl MethodConfig {
         "link",
         "stages",
     ];
+}
+
+/// Takes the sections of the sensors beside the radar, and reads each alone, so that an error names
+/// it.
+fn sensors(table: &mut Table) -> Result<SensorConfigs, ConfigurationError> {
+    let mut all = Table::new();
+    for name in Witness::ALL.map(Witness::name) {
+        if let Some(section) = table.remove(name) {
+            let alone = Table::from_iter([(name.to_owned(), section.clone())]);
+            read::<SensorConfigs>(name, alone.into())?;
+            all.insert(name.to_owned(), section);
+        }
+    }
+    read("", all.into())
 }

@@ -5,20 +5,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_geometry::samples::SampleKind;
 use toml::{Table, Value};
 
 use crate::{ConfigurationError, strict};
 
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 10] = [
     "run.ground_truth",
     "source.data",
     "simulation.drive.file",
     "masking.model",
     "masking.runtime",
     "slam.map",
-    "gyro.file",
-    "wheels.file",
-    "gnss.file",
     RECORDING,
     "link.ca",
     "link.certificate",
@@ -128,7 +126,8 @@ fn visit(
     table: &mut Table,
     mut each: impl FnMut(&mut String, &str) -> Result<(), ConfigurationError>,
 ) -> Result<(), ConfigurationError> {
-    for key in KEYS {
+    let logs = SampleKind::ALL.map(|kind| format!("{}.file", kind.section()));
+    for key in KEYS.into_iter().chain(logs.iter().map(String::as_str)) {
         if let Some(Value::String(path)) = value_mut(table, key) {
             each(path, key)?;
         }

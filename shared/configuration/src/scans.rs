@@ -5,8 +5,8 @@ use std::{error::Error, path::Path};
 
 use gyre_contract::run::PlayedFrom;
 use gyre_datasets::{Dataset, Fingerprint, OpenError, SampleLog, ScanSamples, check_first_scan};
-use gyre_geometry::samples::{DopplerConfig, SampleKind, SensorConfig, SensorKind};
-use gyre_simulator::SimulatedDrive;
+use gyre_geometry::samples::{DopplerConfig, SensorConfig, SensorKind};
+use gyre_simulator::{SimulatedDrive, beside::Kind};
 
 use crate::configuration::Configuration;
 
@@ -45,8 +45,8 @@ pub fn open(configuration: &Configuration) -> Result<Played, Failure> {
         None => gyre_recording::open(data, options)?,
     };
     check_first(configuration, dataset.as_ref())?;
-    check_doppler(&method.doppler, dataset.as_mut())?;
-    let sensors = method.sensors();
+    check_doppler(&method.sensors.doppler, dataset.as_mut())?;
+    let sensors = method.sensors.sampled();
     Ok(Played {
         samples: match &drive {
             Some(drive) => simulated_samples(drive, &sensors, dataset.as_mut())?,
@@ -93,13 +93,8 @@ pub fn simulated_samples(
             return Ok(all.and(ScanSamples::open(&[*sensor], Path::new(""), dataset)?));
         }
         let of = sensor.of();
-        let none = match of {
-            SampleKind::Gyro => "no gyro: give it one",
-            SampleKind::Wheels => "no wheels that measure: give them a rate",
-            // Fixes travel with no scan.
-            SampleKind::Gnss => return Ok(all),
-        };
         let Some(samples) = drive.samples(of) else {
+            let none = Kind::of(of).map_or("none", |kind| kind.lacks);
             let of = of.section();
             return refused(&format!(
                 "{of}.kind is `auto`, but the simulation has {none} in [simulation.{of}], or set {of}.kind = \"none\""

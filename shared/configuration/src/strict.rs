@@ -155,20 +155,23 @@ fn value_of(text: &str) -> Value {
         .unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
-fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, ConfigurationError> {
+pub fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, ConfigurationError> {
     value.try_into().map_err(
         |error: toml::de::Error| match unknown_field(error.message()) {
             Some((key, known)) => unknown(section, key, &known),
-            None => self::value(section, reason(&error)),
+            None => self::value(section, reason(section, &error)),
         },
     )
 }
 
-/// Returns the reason with its key. The library adds "in `key`" behind its sentence.
-fn reason(error: &toml::de::Error) -> String {
+/// Returns the reason with its key. The library adds "in `key`" behind its sentence; of a section
+/// that was read by its name, the key begins with the name.
+fn reason(section: &str, error: &toml::de::Error) -> String {
     let sentence = error.to_string().trim().replace('\n', " ");
     let place = sentence.rsplit_once(" in `");
     let key = place.and_then(|(_, key)| key.strip_suffix('`'));
+    let key = key.filter(|key| *key != section);
+    let key = key.map(|key| key.strip_prefix(&format!("{section}.")).unwrap_or(key));
     in_plain_words(key.unwrap_or("it"), error.message()).unwrap_or(sentence)
 }
 

@@ -76,7 +76,7 @@ pub struct PendingSwap {
     pub limit_s: Option<f64>,
 }
 
-crate::named! {
+gyre_geometry::named! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Phase {
@@ -108,7 +108,7 @@ pub struct ProcessStatus {
     pub received: Option<Received>,
 }
 
-crate::named! {
+gyre_geometry::named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Activity {

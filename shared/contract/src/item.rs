@@ -21,7 +21,7 @@ pub mod flag {
     pub(crate) const ALL: u32 = END | BREAK | SYNC | BASE;
 }
 
-crate::named! {
+gyre_geometry::named! {
     /// The stages of a pipeline in the order of the stream; a stage's value is the index of its
     /// [`Hop`]. A run has either the two decoupled searches or the joint one, and may lack
     /// refinement; the hops of missing stages stay zero.
@@ -40,7 +40,7 @@ crate::named! {
     }
 }
 
-crate::named! {
+gyre_geometry::named! {
     /// The followers of a run, in the order of reading each other's logs. They read durable logs at
     /// their own pace and are not in the stream of scans, so they have no [`Hop`] and
     /// give no credit.

@@ -14,7 +14,6 @@ mod limits;
 mod masked;
 mod message;
 mod motion;
-mod named;
 mod object;
 mod pose;
 mod refinement;
@@ -24,10 +23,13 @@ mod scan;
 mod stages;
 mod topics;
 pub mod wire;
-mod witness;
 
 pub use basis::{Basis, WitnessCounts};
 pub use follower::{CorrectionHeader, FixHeader, LoopHeader, fix_status};
+pub use gyre_geometry::{
+    named,
+    samples::{Measures, Witness},
+};
 pub use intake::IntakeHeader;
 pub use item::{FollowerId, Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window};
@@ -44,4 +46,3 @@ pub use topics::{
     Correction, Fix, Footprint, GivenAnew, Intake, Loop, Masked, Motion, NumberedBy, Objects, Pose,
     Refined, Rotation, Scan, all, named as topic_named, topic, topics,
 };
-pub use witness::{Measures, Witness};

@@ -2,7 +2,7 @@
 
 use gyre_geometry::{
     SparsePoint, Twist,
-    samples::{DopplerVelocity, GyroTurn, WheelDistance},
+    samples::{Evidence, Witness},
 };
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -10,7 +10,6 @@ use crate::{
     item::Item,
     limits::Limits,
     message::{ByteBlock, FloatBlock, Header},
-    refinement::NO_YES,
     wire::{Bounds, codes, describe, wire},
 };
 
@@ -26,10 +25,8 @@ codes! {
 }
 
 wire! {
-    /// The geometry of a raster and the processing that led to it. What `has_*` is 1 for was
-    /// measured: the turn and the distance since the previous scan, and the velocity during this
-    /// one.
-    pub struct MaskedHeader = "gyre_masked_header_v9" {
+    /// The geometry of a raster and the processing that led to it.
+    pub struct MaskedHeader = "gyre_masked_header_v10" {
         pub item: Item,
         /// Cells per side. Row 0 is far ahead, column 0 far left, the sensor is in the middle.
         pub n: u32 [Bounds::OfRun(|it| it.side() as f64)],
@@ -48,47 +45,29 @@ wire! {
         /// Variance of the mean of the rows' azimuths, rad²: not zero where azimuths were lost at
         /// places that are not known.
         pub azimuth_variance_rad2: f32 [Bounds::NotNegative],
-        pub gyro: GyroTurn,
-        pub has_gyro: u64 [Bounds::Codes(NO_YES)],
-        pub wheels: WheelDistance,
-        pub has_wheels: u64 [Bounds::Codes(NO_YES)],
-        pub doppler: DopplerVelocity,
-        pub has_doppler: u64 [Bounds::Codes(NO_YES)],
+        /// About the motion from the previous scan, in the order of [`Witness::ALL`].
+        pub evidence: [Evidence; Witness::ALL.len()],
     }
 }
 
 describe! {
-    /// The turn of the sensor from one scan to the next by the gyro, counter-clockwise.
-    GyroTurn = "gyre_gyro_turn_v1" {
-        /// From the stamp of the scan before to the stamp of the scan, rad, with the bias.
-        yaw_rad: f64 [Bounds::Finite],
-        /// Variance but for the bias and the scale, rad².
-        variance_rad2: f64 [Bounds::NotNegative],
+    /// A measurement by another sensor than the radar about the motion from the scan before to a
+    /// scan. Of a gyro: the turn from stamp to stamp (rad), counter-clockwise, and the mean rate
+    /// during the sweep (rad/s), both with the bias. Of wheels: the distance ahead along the
+    /// vehicle's path (m). Of Doppler: the velocity of the radar in the middle of the sweep, ahead
+    /// and to the left (m/s).
+    Evidence = "gyre_evidence_v1" {
+        /// Number of samples or bearings that determine it; zero: it was not measured.
+        samples: u64,
+        /// From the stamp of the scan before to the stamp of the scan, s; zero of a velocity.
         interval_s: f64 [Bounds::NotNegative],
-        /// Mean rate during the sweep of the scan, rad/s, with the bias.
-        sweep_rate_radps: f64 [Bounds::Finite],
-    }
-
-    /// The distance from one scan to the next by the wheels, along the vehicle's path.
-    WheelDistance = "gyre_wheel_distance_v1" {
-        /// From the stamp of the scan before to the stamp of the scan, m; negative backwards.
-        distance_m: f64 [Bounds::Finite],
-        /// Variance but for the scale, m².
-        variance_m2: f64 [Bounds::NotNegative],
-        side_variance_m2: f64 [Bounds::NotNegative],
-        interval_s: f64 [Bounds::NotNegative],
-    }
-
-    /// The velocity of the radar by the Doppler shift of one scan, at the middle of its sweep:
-    /// along the axes of the radar, x forward, y left.
-    DopplerVelocity = "gyre_doppler_velocity_v1" {
-        /// x and y, m/s.
-        velocity_mps: [f64; 2] [Bounds::Finite],
-        /// Variance of x, covariance, variance of y, m²/s², but for the error of the Doppler
-        /// coefficient, which all scans share.
+        value: [f64; 2] [Bounds::Finite],
+        /// The rate of the first value at the stamp of the scan minus the rate at the stamp of the scan
+        /// before, per second: the error of the value by a delay of 1 s.
+        change: f64 [Bounds::Finite],
+        /// Variance of the first value, covariance, variance of the second, but for the errors that
+        /// all motions share: bias and scale.
         covariance: [f64; 3] [Bounds::Covariance2],
-        /// Number of bearings that agree with it.
-        bearings: u64,
     }
 }
 
@@ -159,16 +138,15 @@ impl MaskedHeader {
         Some(FloatBlock::count(cells) * FloatBlock::LEN)
     }
 
-    pub fn turn(&self) -> Option<GyroTurn> {
-        (self.has_gyro == 1).then_some(self.gyro)
+    /// Returns the evidence of a kind; `None` if nothing was measured.
+    pub fn of(&self, kind: Witness) -> Option<&Evidence> {
+        self.evidence[kind as usize].measured()
     }
 
-    pub fn distance(&self) -> Option<WheelDistance> {
-        (self.has_wheels == 1).then_some(self.wheels)
-    }
-
-    pub fn velocity(&self) -> Option<DopplerVelocity> {
-        (self.has_doppler == 1).then_some(self.doppler)
+    /// Returns the turn since the scan before by the gyro, rad, which limits a search for it; `None`
+    /// if it was not measured.
+    pub fn turn_rad(&self) -> Option<f64> {
+        self.of(Witness::Gyro).map(|turn| turn.value[0])
     }
 
     /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too

@@ -1,9 +1,8 @@
 //! The record of a refinement in the messages that carry a motion.
 
-use crate::{
-    wire::{Bounds, codes, wire},
-    witness::{Measures, Witness},
-};
+use gyre_geometry::samples::{Measures, Witness};
+
+use crate::wire::{Bounds, codes, wire};
 
 codes! {
     pub mod outcome: u32 {
@@ -45,21 +44,25 @@ codes! {
 
 wire! {
     /// A sensor beside the radar in a motion; all zero if it has not measured the motion.
-    pub struct WitnessRecord = "gyre_witness_record_v1" {
+    pub struct WitnessRecord = "gyre_witness_record_v2" {
         /// See [`verdict`].
         pub verdict: u64 [Bounds::Codes(verdict::NAMES)],
-        /// The turn (rad) or the distance (m) since the previous scan that it measured.
+        /// The turn (rad) or the distance (m) since the previous scan that it measured, or the
+        /// heading (rad).
         pub measured: f64 [Bounds::Finite],
         /// The true value over the measured one, after the scan.
         pub scale: f64 [Bounds::Finite],
         pub scale_sigma: f64 [Bounds::Finite],
-        /// Bias after the scan, rad/s; zero of a sensor of the distance.
+        /// Bias after the scan, rad/s; the offset of an absolute heading, rad; zero of a distance.
         pub bias: f64 [Bounds::Finite],
         pub bias_sigma: f64 [Bounds::Finite],
+        /// Delay of its stamps beyond the configured one, s.
+        pub delay_s: f64 [Bounds::Finite],
+        pub delay_sigma_s: f64 [Bounds::Finite],
     }
 
     /// The result of a refinement; all zero without one.
-    pub struct RefinementRecord = "gyre_refinement_v7" {
+    pub struct RefinementRecord = "gyre_refinement_v8" {
         /// See [`outcome`].
         pub outcome: u32 [Bounds::Codes(outcome::NAMES)],
         /// The initial guess of the accepted motion: see [`initial_guess`].

@@ -224,7 +224,7 @@ impl fmt::Display for Footprint {
     }
 }
 
-crate::named! {
+gyre_geometry::named! {
     /// The process that numbers the items of a topic; its name is in the file of the generations.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum NumberedBy {

@@ -11,6 +11,7 @@ mod chain;
 mod composed_motion;
 pub mod covariance;
 mod lost;
+mod named;
 mod point;
 mod pose;
 pub mod samples;

@@ -9,22 +9,22 @@
 
 mod config;
 mod doppler;
+mod evidence;
 mod geodesy;
 mod gnss;
-mod gyro;
 mod integral;
 mod live;
 mod sample;
 mod wheels;
-mod wheels_config;
+mod witness;
 
-pub use config::{GyroConfig, SensorConfig, SensorKind, UpAxis};
-pub use doppler::{DopplerConfig, DopplerDisplacement, DopplerKind, DopplerVelocity};
+pub use config::{GyroConfig, SensorConfig, SensorConfigs, SensorKind, UpAxis};
+pub use doppler::{DopplerConfig, DopplerKind};
+pub use evidence::{AllEvidence, Evidence, SampledSensors};
 pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{GnssConfig, GnssFix};
-pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
-pub use integral::interval_of;
+pub use integral::{Integrator, interval_of};
 pub use live::LiveSamples;
-pub use sample::{Logged, MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
-pub use wheels::{WheelDistance, Wheels};
-pub use wheels_config::WheelsConfig;
+pub use sample::{Logged, MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample};
+pub use wheels::WheelsConfig;
+pub use witness::{Measures, Row, SampleKind, Witness};

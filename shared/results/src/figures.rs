@@ -3,6 +3,9 @@
 //!
 //! A place in `summary.json` identifies a figure, so that old and new runs look alike.
 
+use std::sync::LazyLock;
+
+use gyre_contract::Witness;
 use serde_json::Value;
 
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +26,7 @@ enum Kind {
     Unusual,
 }
 
-pub type Group = (&'static str, &'static [Figure]);
+pub type Group = (&'static str, Vec<Figure>);
 
 const fn count(name: &'static str, place: &'static str) -> Figure {
     number(name, place, 0, 1.0)
@@ -56,15 +59,15 @@ const fn error(name: &'static str, place: &'static str, decimals: usize) -> Figu
 pub const ACCURACY: &str = "Accuracy";
 
 #[rustfmt::skip]
-pub const GROUPS: [Group; 5] = [
-    ("Drive", &[
+pub static GROUPS: LazyLock<[Group; 5]> = LazyLock::new(|| [
+    ("Drive", vec![
         count("problem", "/problem"),
         number("path, m", "/path_m", 1, 1.0),
         number("duration, s", "/duration_s", 1, 1.0),
         count("poses", "/processed"),
         count("compared with the ground truth", "/evaluation/coverage/matched"),
     ]),
-    (ACCURACY, &[
+    (ACCURACY, vec![
         error("ATE, rmse, m", "/evaluation/ate/rmse_m", 3),
         error("ATE, largest, m", "/evaluation/ate/max_m", 3),
         error("drift (KITTI), %", "/evaluation/kitti/translation_percent", 3),
@@ -73,14 +76,14 @@ pub const GROUPS: [Group; 5] = [
         error("end point, m", "/evaluation/end/position_m", 2),
         error("end point, deg", "/evaluation/end/heading_deg", 2),
     ]),
-    ("Latency", &[
+    ("Latency", vec![
         number("latency, median, ms", "/latency/sensor_to_pose/p50_us", 1, 1e-3),
         number("latency, 99 %, ms", "/latency/sensor_to_pose/p99_us", 1, 1e-3),
         number("time between scans, ms", "/period_s", 0, 1e3),
         number("scans/s", "/scans_per_s", 1, 1.0),
         number("computed in, s", "/wall_s", 1, 1.0),
     ]),
-    ("Counts", &[
+    ("Counts", [&[
         count("scans published", "/published"),
         unusual("scans dropped", "/dropped"),
         unusual("scans unreadable", "/unreadable"),
@@ -94,21 +97,7 @@ pub const GROUPS: [Group; 5] = [
         unusual("motions predicted, since nothing matched", "/motions/predicted"),
         count("motions of a standing vehicle", "/motions/stationary"),
         count("motions along walls without structure", "/motions/along_walls"),
-        count("turns by the gyro", "/gyro/motions"),
-        unusual("turns of the gyro doubted", "/gyro/doubted"),
-        unusual("turns of the gyro refused", "/gyro/refused"),
-        number("bias of the gyro, rad/s", "/gyro/bias_radps", 7, 1.0),
-        number("its deviation, rad/s", "/gyro/bias_sigma_radps", 7, 1.0),
-        count("distances by the wheels", "/wheels/motions"),
-        unusual("distances of slipping wheels", "/wheels/slips"),
-        count("motions predicted by the wheels", "/wheels/predicted"),
-        number("scale of the wheels", "/wheels/scale", 4, 1.0),
-        number("its deviation", "/wheels/scale_sigma", 4, 1.0),
-        count("velocities by Doppler", "/doppler/motions"),
-        count("velocities by Doppler refused", "/doppler/refused"),
-        count("motions predicted by Doppler", "/doppler/predicted"),
-        number("scale of Doppler", "/doppler/scale", 4, 1.0),
-        number("its deviation", "/doppler/scale_sigma", 4, 1.0),
+    ][..], &of_sensors(), &[
         unusual("restarts of processes", "/restarts"),
         count("recovered after, ms", "/recovery_ms"),
         count("keyframes", "/slam/keyframes"),
@@ -127,8 +116,8 @@ pub const GROUPS: [Group; 5] = [
         number("begins at latitude, deg", "/gnss/origin/latitude_deg", 6, 1.0),
         number("begins at longitude, deg", "/gnss/origin/longitude_deg", 6, 1.0),
         number("begins with heading, deg", "/gnss/origin/heading_deg", 2, 1.0),
-    ]),
-    ("Versions", &[
+    ][..]].concat()),
+    ("Versions", vec![
         count("ending", "/ending"),
         count("data", "/data"),
         count("mode", "/mode"),
@@ -139,7 +128,16 @@ pub const GROUPS: [Group; 5] = [
         count("version of Gyre", "/version"),
         count("processor", "/machine/processor"),
     ]),
-];
+]);
+
+fn of_sensors() -> Vec<Figure> {
+    let rows = Witness::ALL.iter().flat_map(|kind| kind.row().figures);
+    let figures = rows.map(|(name, place, decimals)| match decimals {
+        Some(decimals) => number(name, place, *decimals, 1.0),
+        None => unusual(name, place),
+    });
+    figures.collect()
+}
 
 impl Figure {
     pub fn text(&self, summary: &Value) -> Option<String> {
@@ -184,7 +182,7 @@ impl Figure {
 
 /// Returns the counts of the unusual events of a run, with their names, or `nothing`.
 pub fn all_unusual(summary: &Value) -> String {
-    let figures = GROUPS.iter().flat_map(|(_, figures)| *figures);
+    let figures = GROUPS.iter().flat_map(|(_, figures)| figures);
     let unusual = figures.filter(|it| it.kind == Kind::Unusual);
     let counted = unusual.filter_map(|figure| {
         let count = match summary.pointer(figure.place)? {

@@ -241,7 +241,7 @@ impl fmt::Display for Summary {
         let groups = figures::GROUPS.iter();
         for (title, rows) in groups.filter(|it| it.0 != figures::ACCURACY) {
             writeln!(f, "\n{title}")?;
-            for row in *rows {
+            for row in rows {
                 if let Some(text) = row.text(&figures) {
                     writeln!(f, "  {:41}{text}", row.name)?;
                 }

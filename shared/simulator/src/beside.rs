@@ -27,6 +27,8 @@ pub struct Kind {
     pub header: &'static str,
     /// The value of a sample in each column after the stamp.
     columns: &'static [usize],
+    /// What a simulation without it lacks, in words.
+    pub lacks: &'static str,
 }
 
 pub const KINDS: [Kind; 3] = [
@@ -36,18 +38,21 @@ pub const KINDS: [Kind; 3] = [
         // As in the log of RADIATE.
         header: "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2",
         columns: &[0, 1, 2, 3, 4, 5],
+        lacks: "no gyro: give it one",
     },
     Kind {
         of: SampleKind::Wheels,
         file: "wheels.csv",
         header: "stamp_ns,speed_m_s",
         columns: &[0],
+        lacks: "no wheels that measure: give them a rate",
     },
     Kind {
         of: SampleKind::Gnss,
         file: "gnss.csv",
         header: "stamp_ns,latitude_deg,longitude_deg,sigma_m",
         columns: &[0, 1, 3],
+        lacks: "no receiver: give it a rate",
     },
 ];
 
@@ -59,12 +64,16 @@ pub fn samples(
     kind: SampleKind,
     records: impl FnOnce(&Kind) -> Option<Vec<Record>>,
 ) -> Option<Vec<Sample>> {
-    let row = KINDS.iter().find(|row| row.of == kind)?;
+    let row = Kind::of(kind)?;
     let sample = |(stamp_ns, values)| Sample::of(kind, stamp_ns, values);
     Some(records(row)?.into_iter().map(sample).collect())
 }
 
 impl Kind {
+    pub fn of(kind: SampleKind) -> Option<&'static Self> {
+        KINDS.iter().find(|row| row.of == kind)
+    }
+
     pub fn csv(&self, records: &[Record]) -> String {
         let mut text = format!("{}\n", self.header);
         for (stamp_ns, values) in records {

@@ -1,11 +1,17 @@
 use std::path::PathBuf;
 
 use gyre_datasets::DatasetOptions;
+use gyre_geometry::samples::SampleKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    beside::{gnss::SimulatedGnssConfig, gyro::SimulatedGyroConfig, wheels::SimulatedWheelsConfig},
+    beside::{
+        Device,
+        gnss::{self, SimulatedGnssConfig},
+        gyro::{self, SimulatedGyroConfig},
+        wheels::{self, SimulatedWheelsConfig},
+    },
     error::SimulatorError,
     output::{OutputConfig, OutputFormat},
     path::{BlockLoop, Path, recorded},
@@ -137,6 +143,15 @@ impl SimulationConfig {
             return Err(SimulatorError::key("sensor.lost_azimuths", true, expected));
         }
         Ok(())
+    }
+
+    /// Returns a sensor beside the radar; `None` if there is none.
+    pub(crate) fn device<'a>(&self, of: SampleKind, path: &'a dyn Path) -> Option<Device<'a>> {
+        match of {
+            SampleKind::Gyro => gyro::device(&self.gyro, self.seed, path),
+            SampleKind::Wheels => wheels::device(&self.wheels, self.seed, path),
+            SampleKind::Gnss => gnss::device(&self.gnss, self.seed, path),
+        }
     }
 
     pub(crate) fn sensor_seed(&self) -> u64 {

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use gyre_geometry::{OwnedScan, Pose, ScanLimits, ScanSlot, SweepGeometry, samples::SampleKind};
+use gyre_geometry::{OwnedScan, Pose, ScanLimits, ScanSlot, SweepGeometry};
 use nalgebra::Point2;
 
 use crate::{
-    beside::{Kind, Record, gnss, gyro, wheels},
+    beside::{Kind, Record},
     cars::Cars,
     config::{MAX_SCANS, Realism, SimulationConfig},
     error::SimulatorError,
@@ -115,13 +115,8 @@ impl Simulator {
     /// The samples of a sensor beside the radar, by their stamps. `None` if the drive has no such
     /// sensor.
     pub(crate) fn records(&self, kind: &Kind) -> Option<Vec<Record>> {
-        let (config, seed, path) = (&self.config, self.config.seed, self.path());
-        let device = match kind.of {
-            SampleKind::Gyro => gyro::device(&config.gyro, seed, path),
-            SampleKind::Wheels => wheels::device(&config.wheels, seed, path),
-            SampleKind::Gnss => gnss::device(&config.gnss, seed, path),
-        };
-        Some(device?.records(self.span()))
+        let device = self.config.device(kind.of, self.path())?;
+        Some(device.records(self.span()))
     }
 
     pub fn sensor(&self) -> Sensor {

@@ -9,13 +9,13 @@ use gyre::{
 use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_contract::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag, run::Ending};
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{SparsePoint, samples::SensorConfigs};
 use gyre_journal::{
     self as journal, Journal, PoseLog,
     checkpoint::{self, Checkpoint},
     keyframes::Keyframes,
 };
-use gyre_matching::Refiner;
+use gyre_matching::{Refiner, Searched};
 use gyre_results::{Identity, Out, Programs, Session};
 use gyre_slam::{Keyframe, records_path};
 use nalgebra::{Isometry2, Vector2};
@@ -152,7 +152,7 @@ struct Stages {
 impl Stages {
     fn start(out: &Path, configuration: &Configuration) -> Result<Self, Failure> {
         let config = &configuration.odometry.refinement;
-        let refiner = Refiner::new(config, POINTS)?;
+        let refiner = Refiner::new(config, &SensorConfigs::default(), POINTS)?;
         let cells = refiner.keyframe_cells();
         let checkpoint = Checkpoint::open(&checkpoint::path(out), WINDOW, config.keyframes, cells)?;
         let mut journal = Journal::open(out)?;
@@ -213,9 +213,9 @@ impl Stages {
         let (later, earlier) = (scan(seq), scan(before));
         let searched = Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0);
         let interval_s = INTERVAL_NS as f64 * 1e-9;
-        let refined = self
-            .refiner
-            .refine(seq, &later, &earlier, &searched, interval_s);
+        let refined = self.refiner.refine(&Searched::by_radar(
+            seq, &later, &earlier, &searched, interval_s,
+        ));
         let found = MotionEstimate {
             x_m: STEP_M,
             interval_ns: INTERVAL_NS,

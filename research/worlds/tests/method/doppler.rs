@@ -1,7 +1,7 @@
 //! The velocity by Doppler on simulated scans of a RAS6, against the true one. A table.
 
 use gyre_datasets::open_source;
-use gyre_geometry::{OwnedScan, samples::DopplerVelocity};
+use gyre_geometry::{OwnedScan, samples::Evidence};
 use gyre_radar::{DopplerEstimator, NoDoppler, PointsConfig};
 use gyre_worlds::{OutputFormat, Profile, Realism, SimulatedDrive, SimulationConfig};
 use nalgebra::{Matrix2, Vector2};
@@ -97,7 +97,7 @@ impl Errors {
 }
 
 impl Error {
-    fn of(found: &DopplerVelocity, drive: &SimulatedDrive, index: usize) -> Self {
+    fn of(found: &Evidence, drive: &SimulatedDrive, index: usize) -> Self {
         let simulator = drive.simulator();
         let time = simulator.time(index);
         let middle_s = time.drive_time_s(time.middle_us());
@@ -105,7 +105,7 @@ impl Error {
         let truth = path.pose(middle_s).rotation.inverse() * path.velocity(middle_s);
         let [xx, xy, yy] = found.covariance;
         Self {
-            off: Vector2::from(found.velocity_mps) - truth,
+            off: Vector2::from(found.value) - truth,
             covariance: Matrix2::new(xx, xy, xy, yy),
         }
     }

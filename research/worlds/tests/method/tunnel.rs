@@ -84,16 +84,16 @@ fn with(
     }
     let (mut samples, path) = (ScanSamples::None, Path::new("simulation"));
     if gyro {
-        config.gyro.kind = SensorKind::Auto;
+        config.sensors.gyro.kind = SensorKind::Auto;
         let gyro = drive.samples(SampleKind::Gyro).unwrap().into();
         let log = SampleLog::of(SampleKind::Gyro, gyro, path).unwrap();
-        samples = ScanSamples::of_log(&log, &config.gyro, dataset).unwrap();
+        samples = ScanSamples::of_log(&log, &config.sensors.gyro, dataset).unwrap();
     }
     if wheels {
-        config.wheels.kind = SensorKind::Auto;
+        config.sensors.wheels.kind = SensorKind::Auto;
         let wheels = drive.samples(SampleKind::Wheels).unwrap().into();
         let log = SampleLog::of(SampleKind::Wheels, wheels, path).unwrap();
-        samples = samples.and(ScanSamples::of_log(&log, &config.wheels, dataset).unwrap());
+        samples = samples.and(ScanSamples::of_log(&log, &config.sensors.wheels, dataset).unwrap());
     }
     (config, samples)
 }
@@ -242,7 +242,7 @@ fn the_way_through_a_tunnel_is_that_of_doppler() {
             let run = ([gyro, false], Scales::Default);
             let (mut config, samples) = with(run, &drive, recording.0.as_ref());
             if doppler {
-                config.doppler.kind = DopplerKind::Auto;
+                config.sensors.doppler.kind = DopplerKind::Auto;
             }
             let through = registered(&config, &samples, &drive, &recording);
             through.print(seed, &format!("{gyro}, {doppler}"));

@@ -8,8 +8,7 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_datasets::SampleLog;
-use gyre_geometry::samples::SensorKind;
-use gyre_matching::odometry::OdometryConfig;
+use gyre_geometry::samples::{SensorConfigs, SensorKind};
 
 use super::{CalibrateArguments, Recorded};
 
@@ -17,14 +16,14 @@ use super::{CalibrateArguments, Recorded};
 struct Row {
     kind: &'static Kind,
     named: fn(&CalibrateArguments) -> Option<&PathBuf>,
-    settings: fn(&OdometryConfig) -> SensorSettings,
+    settings: fn(&SensorConfigs) -> SensorSettings,
 }
 
 const ROWS: [Row; 2] = [
     Row {
         kind: &kinds::GYRO,
         named: |arguments| arguments.gyro.as_ref(),
-        settings: |OdometryConfig { gyro, .. }| SensorSettings {
+        settings: |SensorConfigs { gyro, .. }| SensorSettings {
             is_used: gyro.is_used(),
             file: gyro.file.clone().filter(|_| gyro.kind == SensorKind::Log),
             up: gyro.up,
@@ -37,7 +36,7 @@ const ROWS: [Row; 2] = [
     Row {
         kind: &kinds::WHEELS,
         named: |arguments| arguments.wheels.as_ref(),
-        settings: |OdometryConfig { wheels, .. }| SensorSettings {
+        settings: |SensorConfigs { wheels, .. }| SensorSettings {
             is_used: wheels.is_used(),
             file: wheels
                 .file
@@ -53,8 +52,12 @@ const ROWS: [Row; 2] = [
 ];
 
 /// Leaves the radar alone: the other sensors are compared with it.
-pub(super) fn leave_out(config: &mut OdometryConfig) {
-    (config.gyro.kind, config.wheels.kind) = (SensorKind::None, SensorKind::None);
+pub(super) fn leave_out(config: &mut SensorConfigs) {
+    let doppler = config.doppler.clone();
+    *config = SensorConfigs {
+        doppler,
+        ..SensorConfigs::default()
+    };
 }
 
 /// The log of a sensor in a drive.
@@ -91,7 +94,7 @@ impl Sensor {
         configuration: &Configuration,
         arguments: &CalibrateArguments,
     ) -> Result<Option<Self>, Failure> {
-        let configured = (row.settings)(&configuration.odometry);
+        let configured = (row.settings)(&configuration.odometry.sensors);
         let named = (row.named)(arguments).or(configured.file.as_ref()).cloned();
         let is_named = named.is_some();
         let of = row.kind.sensor;

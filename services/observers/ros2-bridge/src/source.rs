@@ -13,9 +13,7 @@ use std::time::Duration;
 use gyre_client::RunError;
 use gyre_contract::run::{SourceConfig, StageCounters};
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::samples::{
-    GnssConfig, GyroConfig, SampleKind, SensorConfig, SensorKind, WheelsConfig,
-};
+use gyre_geometry::samples::{GnssConfig, SampleKind, SensorKind};
 use gyre_ros2_messages::Domain;
 use gyre_stage::{Launch, source};
 use gyre_stages::live_radar::{encoder_counts, silence};
@@ -67,12 +65,11 @@ impl Settings {
 }
 
 pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, RunError> {
-    let (gyro, wheels): (GyroConfig, WheelsConfig) =
-        (launch.section("gyro")?, launch.section("wheels")?);
-    let gnss: GnssConfig = launch.section("gnss")?;
-    let sensors: [&dyn SensorConfig; 3] = [&gyro, &wheels, &gnss];
+    let (motion, gnss): (_, GnssConfig) = (launch.sensors()?, launch.section("gnss")?);
+    let mut sensors = motion.sampled();
+    sensors.push(&gnss);
     let in_ros2 = sensors.iter().filter(|it| it.kind() == SensorKind::Ros2);
-    let topics = in_ros2.map(|it| (it.of(), it.live_topic().to_owned()));
+    let topics = in_ros2.filter_map(|it| Some((it.of(), it.live_topic()?.to_owned())));
     settings.sensors = topics.collect();
     settings.fixes_to.clone_from(&gnss.listen);
     let scans = settings.scans;

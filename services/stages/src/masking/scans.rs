@@ -3,7 +3,7 @@
 use gyre_contract::{Item, Scan, Window, flag};
 use gyre_geometry::{
     LostAzimuths, Twist,
-    samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate},
+    samples::{AllEvidence, Sample, SampledSensors},
 };
 use gyre_stage::{
     Launch,
@@ -20,8 +20,7 @@ use crate::masking::{
 pub struct Scans {
     queue: Box<dyn Queue>,
     motions: Motions,
-    gyro: Gyro,
-    wheels: Wheels,
+    sensors: SampledSensors,
     sampled: Option<u64>,
     window: Window,
     /// The velocities for the current and for the previous scan.
@@ -32,8 +31,8 @@ pub struct Scans {
 pub struct ScanView<'a> {
     pub current: MovedScan<'a>,
     pub previous: Option<MovedScan<'a>>,
-    pub turn: Option<GyroTurn>,
-    pub distance: Option<WheelDistance>,
+    /// Of the sensors whose samples come with the scans.
+    pub evidence: AllEvidence,
 }
 
 pub struct MovedScan<'a> {
@@ -57,8 +56,7 @@ impl Inputs for Scans {
         Ok(Self {
             queue,
             motions,
-            gyro: Gyro::new(&launch.section("gyro")?),
-            wheels: Wheels::new(&launch.section("wheels")?),
+            sensors: SampledSensors::new(&launch.sensors()?),
             sampled: None,
             window: launch.manifest.window,
             found: [None; 2],
@@ -87,21 +85,20 @@ impl Inputs for Scans {
 
     fn view(&self) -> Option<ScanView<'_>> {
         let [motion, previous_motion] = self.found;
-        let [previous_rate, rate] = self.gyro.sweep_rates_radps();
+        let [previous_twist, twist] = self.sensors.with_yaw_rates([previous_motion, motion]);
         let [lost, previous_lost] = self.lost;
         Some(ScanView {
             current: MovedScan {
                 scan: self.queue.current()?,
-                twist: with_yaw_rate(motion, rate),
+                twist,
                 lost,
             },
             previous: self.queue.previous().map(|scan| MovedScan {
                 scan,
-                twist: with_yaw_rate(previous_motion, previous_rate),
+                twist: previous_twist,
                 lost: previous_lost,
             }),
-            turn: self.gyro.turn(),
-            distance: self.wheels.distance(),
+            evidence: self.sensors.evidence(),
         })
     }
 
@@ -142,7 +139,7 @@ impl Scans {
         found.iter().all(Option::is_some)
     }
 
-    /// Hands the samples of the current scan to gyro and wheels, once. Before that it hands over
+    /// Hands the samples of the current scan to the sensors, once. Before that it hands over
     /// the samples of the previous scan, if that scan came with a restart, and of the scans dropped
     /// since.
     fn take_samples(&mut self, starts_chain: bool) -> Result<(), RunError> {
@@ -154,23 +151,15 @@ impl Scans {
             return Ok(());
         };
         match previous {
-            _ if starts_chain => {
-                self.gyro.clear();
-                self.wheels.clear();
-            }
+            _ if starts_chain => self.sensors.clear(),
             Some(previous) => {
                 let (samples, stamp_ns, span_ns) = samples_of(previous)?;
-                self.gyro.push(samples, stamp_ns, span_ns);
-                self.wheels.push(samples, stamp_ns, span_ns);
+                self.sensors.push(samples, stamp_ns, span_ns);
             }
-            None => {
-                self.gyro.drop_scan(&dropped);
-                self.wheels.drop_scan(&dropped);
-            }
+            None => self.sensors.drop_scan(&dropped),
         }
         let (samples, stamp_ns, span_ns) = samples_of(current)?;
-        self.gyro.push(samples, stamp_ns, span_ns);
-        self.wheels.push(samples, stamp_ns, span_ns);
+        self.sensors.push(samples, stamp_ns, span_ns);
         self.sampled = Some(current.item().published);
         Ok(())
     }

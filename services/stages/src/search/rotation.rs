@@ -25,7 +25,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     // the scan. A turn measured by the gyro limits the angles that it tries.
     let search = move |input: &PairView<'_, Masked>| {
         let (seq, pair) = (input.current.item().seq, input.rasters()?);
-        let turn = input.current.header().turn().map(|turn| turn.yaw_rad);
+        let turn = input.current.header().turn_rad();
         rotation
             .next(seq, pair.later, pair.earlier, pair.earlier_changed, turn)
             .map_err(|error| input.current.malformed(error.to_string()))

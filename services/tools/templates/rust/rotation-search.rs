@@ -18,7 +18,7 @@ fn main() -> ExitCode {
             Box::new(move |scans| {
                 // Views of shared memory: n x n, row 0 far ahead.
                 let (seq, pair) = (scans.current.item().seq, scans.rasters()?);
-                let turn = scans.current.header().turn().map(|turn| turn.yaw_rad);
+                let turn = scans.current.header().turn_rad();
                 search
                     .next(seq, pair.later, pair.earlier, pair.earlier_changed, turn)
                     .map_err(|error| scans.current.malformed(error.to_string()))

@@ -129,12 +129,14 @@ impl Configuration {
     }
 
     /// The sensors beside the radar.
-    pub fn sensors(&self) -> [&dyn SensorConfig; 3] {
-        let [gyro, wheels] = self.odometry.sensors();
-        [gyro, wheels, &self.gnss]
+    pub fn sensors(&self) -> Vec<&dyn SensorConfig> {
+        let mut sensors = self.odometry.sensors.sampled();
+        sensors.push(&self.gnss);
+        sensors
     }
 
-    /// A log that is used is named, and no two live sensors have one address.
+    /// A log that is used is named, messages of ROS 2 are of a kind that they have, and no two live
+    /// sensors have one address.
     fn validate_sensors(&self) -> Result<(), ConfigurationError> {
         let mut taken = BTreeMap::new();
         for sensor in self.sensors() {
@@ -142,6 +144,10 @@ impl Configuration {
             let is_named = !sensor.file().as_os_str().is_empty();
             if sensor.kind() == SensorKind::Log && !is_named {
                 let reason = "kind is `log`, but no file is named: set file, or kind to `auto`";
+                return Err(value(section, reason));
+            }
+            if sensor.kind() == SensorKind::Ros2 && sensor.live_topic().is_none() {
+                let reason = "kind is `ros2`, but no message of ROS 2 has its samples: receive them with kind = \"udp\"";
                 return Err(value(section, reason));
             }
             let before = sensor.receives().then(|| taken.insert(listen, section));

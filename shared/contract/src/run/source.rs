@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-crate::named! {
+gyre_geometry::named! {
     /// Where scans come from.
     #[derive(
         Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
@@ -137,7 +137,7 @@ impl SourceConfig {
     }
 }
 
-crate::named! {
+gyre_geometry::named! {
     /// The first topic that is played from a recording: the stages that compute it, and all stages
     /// before, are absent.
     #[derive(
@@ -175,7 +175,7 @@ impl PlayedFrom {
     }
 }
 
-crate::named! {
+gyre_geometry::named! {
     /// The kind of a fault.
     #[derive(
         Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,

@@ -240,13 +240,13 @@ fn velocity(report: &mut Report, scan: &PolarScan<'_>) {
             (text, figures)
         }
         Ok(found) => {
-            let ([ahead, left], [x, _, y]) = (found.velocity_mps, found.covariance);
-            let ([of_ahead, of_left], bearings) = ([x.sqrt(), y.sqrt()], found.bearings);
+            let ([ahead, left], [x, _, y]) = (found.value, found.covariance);
+            let ([of_ahead, of_left], bearings) = ([x.sqrt(), y.sqrt()], found.samples);
             let text = format!(
                 "{ahead:.2} +- {of_ahead:.2} m/s ahead, {left:.2} +- {of_left:.2} m/s to the left, by the Doppler shift of {bearings} bearings of the last scan read"
             );
             let figures = json!({
-                "velocity_mps": found.velocity_mps,
+                "velocity_mps": found.value,
                 "sigma_mps": [of_ahead, of_left],
                 "bearings": bearings,
                 "error": null,

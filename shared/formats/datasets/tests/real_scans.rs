@@ -200,8 +200,8 @@ fn a_scan_of_boreas_rt_says_that_its_vehicle_stands() {
     let scan = read(open(&folder, &options).unwrap().as_mut(), 0).unwrap();
     let found = DopplerEstimator::default().estimate(&scan.view(), 5.0);
     let found = found.unwrap();
-    let [ahead, left] = found.velocity_mps;
+    let [ahead, left] = found.value;
     assert!(ahead.hypot(left) < 0.5, "{found:?}");
     let [xx, _, yy] = found.covariance;
-    assert!(xx.max(yy) < 0.04 && found.bearings > 100, "{found:?}");
+    assert!(xx.max(yy) < 0.04 && found.samples > 100, "{found:?}");
 }

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT},
     check_bounds,
-    samples::{Sample, SampleKind},
+    samples::{
+        DopplerConfig, Evidence, Sample, SampleKind, WheelsConfig, Witness, integral::Integrator,
+    },
 };
 
 /// Least standard deviation of a scale: an axis leans by up to 8 degrees, in bends and on slopes.
@@ -94,10 +96,16 @@ pub trait SensorConfig {
     /// The log, for [`SensorKind::Log`].
     fn file(&self) -> &Path;
 
-    fn topic(&self) -> Option<&str>;
+    /// The topic that is configured; `None` also of a kind that no message of ROS 2 has.
+    fn topic(&self) -> Option<&str> {
+        None
+    }
 
-    /// The topic of a live sensor: the configured topic, or the usual one.
-    fn live_topic(&self) -> &str;
+    /// The topic of a live sensor: the configured topic, or the usual one; `None` of a kind that no
+    /// message of ROS 2 has.
+    fn live_topic(&self) -> Option<&str> {
+        None
+    }
 
     /// The address for receiving datagrams.
     fn listen(&self) -> &str;
@@ -112,6 +120,9 @@ pub trait SensorConfig {
     fn max_wait_ms(&self) -> f64 {
         0.0
     }
+
+    /// Delay of its stamps against the radar's, s.
+    fn delay_s(&self) -> f64;
 
     /// Longest time between two samples over which a rate is interpolated, s.
     fn max_gap_s(&self) -> f64 {
@@ -128,9 +139,61 @@ pub trait SensorConfig {
         None
     }
 
+    /// Returns the evidence about the motion from the scan before to a scan; `None` where samples
+    /// are missing.
+    fn measure(&self, _: &Integrator) -> Option<Evidence> {
+        None
+    }
+
     /// Takes a sample over to the radar's clock and the vehicle's axes. `up` is the axis that
     /// points up if the configuration names no axis.
     fn on_radar(&self, sample: &Sample, up: Option<UpAxis>) -> Sample;
+
+    fn validate(&self) -> Result<(), SettingError>;
+
+    fn boxed(&self) -> Box<dyn SensorConfig>;
+}
+
+/// The settings of all sensors beside the radar that measure motions: a section for each
+/// [`Witness`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct SensorConfigs {
+    /// The gyro, if there is one.
+    pub gyro: GyroConfig,
+    /// The wheels, if their speed is known.
+    pub wheels: WheelsConfig,
+    /// The velocity by the Doppler shift of single scans.
+    pub doppler: DopplerConfig,
+}
+
+impl SensorConfigs {
+    /// Returns the settings of a kind that comes as samples.
+    pub fn of(&self, kind: Witness) -> Option<&dyn SensorConfig> {
+        match kind {
+            Witness::Gyro => Some(&self.gyro),
+            Witness::Wheels => Some(&self.wheels),
+            Witness::Doppler => None,
+        }
+    }
+
+    /// Returns the settings of the kinds that come as samples.
+    pub fn sampled(&self) -> Vec<&dyn SensorConfig> {
+        let kinds = Witness::ALL.into_iter();
+        kinds.filter_map(|kind| self.of(kind)).collect()
+    }
+
+    pub fn is_used(&self, kind: Witness) -> bool {
+        let sampled = self.of(kind).map(|it| it.kind().is_used());
+        sampled.unwrap_or_else(|| self.doppler.is_used())
+    }
+
+    pub fn validate(&self) -> Result<(), SettingError> {
+        self.sampled()
+            .into_iter()
+            .try_for_each(SensorConfig::validate)?;
+        self.doppler.validate()
+    }
 }
 
 /// The stamp of a sample on the radar's clock, ns, by the delay of the sensor's.
@@ -141,7 +204,7 @@ pub(super) fn on_clock(sample: &Sample, delay_s: f64) -> i64 {
 
 /// Makes a section with `kind`, `file` and `topic` the settings of a kind of sensor.
 macro_rules! sensor_config {
-    ($config:ident is $of:ident on $live_topic:literal: $($method:item)+) => {
+    ($config:ident is $of:ident $(on $live_topic:literal)?: $($method:item)+) => {
         impl $config {
             pub fn is_used(&self) -> bool {
                 self.kind.is_used()
@@ -165,16 +228,26 @@ macro_rules! sensor_config {
                 self.file.as_deref().unwrap_or(std::path::Path::new(""))
             }
 
-            fn topic(&self) -> Option<&str> {
-                self.topic.as_deref()
-            }
+            $(
+                fn topic(&self) -> Option<&str> {
+                    self.topic.as_deref()
+                }
 
-            fn live_topic(&self) -> &str {
-                self.topic.as_deref().unwrap_or($live_topic)
-            }
+                fn live_topic(&self) -> Option<&str> {
+                    self.topic().or(Some($live_topic))
+                }
+            )?
 
             fn listen(&self) -> &str {
                 &self.listen
+            }
+
+            fn delay_s(&self) -> f64 {
+                self.delay_s
+            }
+
+            fn boxed(&self) -> Box<dyn $crate::samples::SensorConfig> {
+                Box::new(self.clone())
             }
 
             $($method)+
@@ -257,12 +330,14 @@ impl Default for GyroConfig {
 }
 
 impl GyroConfig {
-    /// Returns whether a gyro with these settings can have a learnt scale.
-    pub fn allows_scale(&self, scale: f64) -> bool {
-        (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
+    /// The farthest that a learnt scale of a gyro with these settings can be from 1.
+    pub fn max_scale_error(&self) -> f64 {
+        4.0 * self.scale_sigma.max(LEANING)
     }
+}
 
-    pub fn validate(&self) -> Result<(), SettingError> {
+sensor_config! { GyroConfig is Gyro on "/imu/data":
+    fn validate(&self) -> Result<(), SettingError> {
         check_bounds! { self, "gyro":
             delay_s in DELAY,
             max_wait_ms in WAIT,
@@ -277,9 +352,7 @@ impl GyroConfig {
         }
         Ok(())
     }
-}
 
-sensor_config! { GyroConfig is Gyro on "/imu/data":
     fn max_wait_ms(&self) -> f64 {
         self.max_wait_ms
     }
@@ -290,6 +363,21 @@ sensor_config! { GyroConfig is Gyro on "/imu/data":
 
     fn up(&self) -> Option<UpAxis> {
         self.up
+    }
+
+    /// Returns the turn and the mean rate during the sweep, both with the bias.
+    fn measure(&self, between: &Integrator) -> Option<Evidence> {
+        let integral = between.integral?;
+        let [_, sweep_rate_radps] = between.means();
+        let by_time = self.time_sigma_s * integral.change;
+        let walk = self.noise_rad_per_sqrt_s.powi(2) * integral.interval_s;
+        Some(Evidence {
+            samples: integral.samples,
+            interval_s: integral.interval_s,
+            value: [integral.sum, sweep_rate_radps?],
+            change: integral.change,
+            covariance: [walk + by_time * by_time, 0.0, 0.0],
+        })
     }
 
     /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its

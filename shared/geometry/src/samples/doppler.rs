@@ -3,37 +3,13 @@
 
 use std::f64::consts::PI;
 
-use bytemuck::{Pod, Zeroable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     bounds::{SHARE, SettingError, check},
-    samples::{WheelDistance, WheelsConfig},
+    samples::Evidence,
 };
-
-/// The velocity of the radar by the Doppler shift of one scan, at the middle of its sweep: along
-/// the axes of the radar, x forward, y left.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct DopplerVelocity {
-    /// x and y, m/s.
-    pub velocity_mps: [f64; 2],
-    /// Variance of x, covariance, variance of y, m²/s², but for the error of the Doppler
-    /// coefficient, which all scans share.
-    pub covariance: [f64; 3],
-    /// Number of bearings that agree with it.
-    pub bearings: u64,
-}
-
-/// The displacement of the radar from one scan to the next by Doppler, along the heading in the
-/// middle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DopplerDisplacement {
-    /// The displacement ahead, with the variances of both parts.
-    pub ahead: WheelDistance,
-    pub left_m: f64,
-}
 
 /// Configuration of the velocity by Doppler: section `[doppler]`. Of radars whose rising and
 /// falling chirps alternate from azimuth to azimuth.
@@ -77,42 +53,27 @@ impl DopplerConfig {
         self.kind != DopplerKind::None
     }
 
-    /// Returns wheels right below the radar that know their scale as well: what weighs the
-    /// distance by wheels against the radar weighs the displacement by Doppler too.
-    pub fn as_wheels(&self) -> WheelsConfig {
-        WheelsConfig {
-            radar_ahead_m: 0.0,
-            scale_sigma: self.scale_sigma,
-            ..WheelsConfig::default()
-        }
-    }
-
-    /// Returns the displacement between two scans whose velocities are known, over the time between
-    /// them: at the mean of both.
+    /// Returns the displacement ahead and to the left, m, along the heading in the middle, between
+    /// two scans whose velocities are known: at the mean of both.
     ///
     /// Each velocity counts half in two displacements, so that the errors of these do not cancel
     /// and their variances are such that they add up. A velocity that changes evenly shifts a
     /// sweep's velocity to the side by 1 / (4 pi) of the change in a turn, and by as much along the
     /// path if the echoes are uneven: that is added.
-    pub fn displacement(
-        &self,
-        [earlier, later]: [&DopplerVelocity; 2],
-        interval_s: f64,
-    ) -> DopplerDisplacement {
-        let mean = |of: fn(&DopplerVelocity) -> f64| 0.5 * (of(earlier) + of(later));
-        let [ahead, left] = [mean(|it| it.velocity_mps[0]), mean(|it| it.velocity_mps[1])];
-        let [dx, dy] = [0, 1].map(|axis| later.velocity_mps[axis] - earlier.velocity_mps[axis]);
+    pub fn displacement(&self, [earlier, later]: [&Evidence; 2], interval_s: f64) -> Evidence {
+        let mean = |of: fn(&Evidence) -> f64| 0.5 * (of(earlier) + of(later));
+        let [ahead, left] = [mean(|it| it.value[0]), mean(|it| it.value[1])];
+        let [dx, dy] = [0, 1].map(|axis| later.value[axis] - earlier.value[axis]);
         let by_change = (dx * dx + dy * dy) / (4.0 * PI).powi(2);
         let variance =
             |of_scans: f64| (of_scans + by_change + Self::NOISE_MPS.powi(2)) * interval_s.powi(2);
-        DopplerDisplacement {
-            ahead: WheelDistance {
-                distance_m: ahead * interval_s,
-                variance_m2: variance(mean(|it| it.covariance[0])),
-                side_variance_m2: variance(mean(|it| it.covariance[2])),
-                interval_s,
-            },
-            left_m: left * interval_s,
+        let [of_ahead, of_left] = [mean(|it| it.covariance[0]), mean(|it| it.covariance[2])];
+        Evidence {
+            samples: later.samples,
+            interval_s,
+            value: [ahead * interval_s, left * interval_s],
+            change: 0.0,
+            covariance: [variance(of_ahead), 0.0, variance(of_left)],
         }
     }
 
@@ -127,11 +88,13 @@ mod tests {
 
     use super::*;
 
-    fn velocity([x, y]: [f64; 2], sigma: f64) -> DopplerVelocity {
-        DopplerVelocity {
-            velocity_mps: [x, y],
+    fn velocity(value: [f64; 2], sigma: f64) -> Evidence {
+        Evidence {
+            samples: 100,
+            interval_s: 0.0,
+            value,
+            change: 0.0,
             covariance: [sigma * sigma, 0.0, 4.0 * sigma * sigma],
-            bearings: 100,
         }
     }
 
@@ -147,15 +110,15 @@ mod tests {
             let at = |k: usize| velocity([start + change * k as f64, 0.1], sigma);
             let displacements: Vec<_> = (1..scans).map(|k| config.displacement([&at(k - 1), &at(k)], 0.25)).collect();
             let time_s = 0.25 * (scans - 1) as f64;
-            let driven: f64 = displacements.iter().map(|it| it.ahead.distance_m).sum();
+            let driven: f64 = displacements.iter().map(|it| it.value[0]).sum();
             let expected = time_s * (start + 0.5 * change * (scans - 1) as f64);
             prop_assert!((driven - expected).abs() < 1e-9);
-            let left: f64 = displacements.iter().map(|it| it.left_m).sum();
+            let left: f64 = displacements.iter().map(|it| it.value[1]).sum();
             prop_assert!((left - 0.1 * time_s).abs() < 1e-9);
-            let said: f64 = displacements.iter().map(|it| it.ahead.variance_m2).sum();
+            let said: f64 = displacements.iter().map(|it| it.covariance[0]).sum();
             // Errors of the ends count half, of those between whole.
             let of_errors = (sigma * 0.25).powi(2) * ((scans - 2) as f64 + 0.5);
-            prop_assert!(said >= of_errors && displacements.iter().all(|it| it.ahead.side_variance_m2 > 0.0));
+            prop_assert!(said >= of_errors && displacements.iter().all(|it| it.covariance[2] > 0.0));
         }
     }
 

@@ -60,8 +60,8 @@ impl Default for GnssConfig {
     }
 }
 
-impl GnssConfig {
-    pub fn validate(&self) -> Result<(), SettingError> {
+sensor_config! { GnssConfig is Gnss on "/fix":
+    fn validate(&self) -> Result<(), SettingError> {
         for metres in self.lever_m {
             check(
                 "gnss",
@@ -77,9 +77,7 @@ impl GnssConfig {
         }
         Ok(())
     }
-}
 
-sensor_config! { GnssConfig is Gnss on "/fix":
     /// Takes a fix over to the radar's clock, with the configured uncertainty where the log has
     /// none.
     fn on_radar(&self, sample: &Sample, _: Option<UpAxis>) -> Sample {

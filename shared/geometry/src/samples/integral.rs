@@ -8,14 +8,16 @@ const MIN_TURN_NS: i64 = 250_000_000;
 /// The result for a scan depends only on the samples that came with it and with the scan before, so
 /// a process that is restarted at the scan before returns the same result.
 #[derive(Clone, Debug)]
-pub struct Integrator<C> {
-    pub(crate) config: C,
+pub struct Integrator {
+    of: SampleKind,
     /// Longest time between two samples over which the rate is interpolated.
     max_gap_ns: i64,
     earlier: Option<Sweep>,
     later: Option<Sweep>,
     /// Of scans that were dropped since the last one.
     dropped: Vec<Rate>,
+    /// From the first azimuth of the scan before to the last one of the scan.
+    pub(crate) rates: Vec<Rate>,
     /// From the stamp of the scan before to the stamp of the scan; `None` where samples are
     /// missing.
     pub(crate) integral: Option<Integral>,
@@ -25,13 +27,14 @@ pub struct Integrator<C> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Integral {
     pub sum: f64,
-    /// From the rate at the first stamp to that at the second.
+    /// From the rate at the first stamp to the rate at the second.
     pub change: f64,
     pub interval_s: f64,
+    pub samples: u64,
 }
 
 /// A stamp, ns, and the rate.
-type Rate = (i64, f64);
+pub(crate) type Rate = (i64, f64);
 
 #[derive(Clone, Debug, Default)]
 struct Sweep {
@@ -43,14 +46,15 @@ struct Sweep {
     mean: Option<f64>,
 }
 
-impl<C: SensorConfig + Clone> Integrator<C> {
-    pub fn new(config: &C) -> Self {
+impl Integrator {
+    pub fn new(config: &dyn SensorConfig) -> Self {
         Self {
-            config: config.clone(),
+            of: config.of(),
             max_gap_ns: (config.max_gap_s() * 1e9) as i64,
             earlier: None,
             later: None,
             dropped: Vec::new(),
+            rates: Vec::new(),
             integral: None,
         }
     }
@@ -60,7 +64,7 @@ impl<C: SensorConfig + Clone> Integrator<C> {
     pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
         let mut sweep = self.earlier.take().unwrap_or_default();
         sweep.rates.clear();
-        sweep.rates.extend(rates(samples, self.config.of()));
+        sweep.rates.extend(rates(samples, self.of));
         (sweep.stamp_ns, sweep.span_ns) = (stamp_ns, span_ns);
         sweep.mean = sweep.mean(self.max_gap_ns);
         self.earlier = self.later.replace(sweep);
@@ -70,12 +74,13 @@ impl<C: SensorConfig + Clone> Integrator<C> {
 
     /// Takes the samples of a dropped scan: they count as samples of the next scan.
     pub fn drop_scan(&mut self, samples: &[Sample]) {
-        let rates = rates(samples, self.config.of());
+        let rates = rates(samples, self.of);
         self.dropped.extend(rates);
     }
 
     pub fn clear(&mut self) {
         self.dropped.clear();
+        self.rates.clear();
         (self.earlier, self.later, self.integral) = (None, None, None);
     }
 
@@ -85,22 +90,30 @@ impl<C: SensorConfig + Clone> Integrator<C> {
         [&self.earlier, &self.later].map(|sweep| sweep.as_ref()?.mean)
     }
 
-    fn integrate(&self) -> Option<Integral> {
+    /// The stamp of the scan, ns.
+    pub(crate) fn stamp_ns(&self) -> Option<i64> {
+        self.later.as_ref().map(|scan| scan.stamp_ns)
+    }
+
+    fn integrate(&mut self) -> Option<Integral> {
+        self.rates.clear();
         let (before, scan) = (self.earlier.as_ref()?, self.later.as_ref()?);
         let since = before
             .rates
             .iter()
             .filter(|rate| rate.0 >= before.span_ns[0]);
-        let mut rates: Vec<Rate> = Vec::with_capacity(before.rates.len() + scan.rates.len());
+        let rates = &mut self.rates;
         for rate in since.chain(&self.dropped).chain(&scan.rates) {
             // A sample can come with two scans.
             let is_later = rates.last().is_none_or(|last| last.0 < rate.0);
             rates.extend(is_later.then_some(*rate));
         }
+        let stamps_ns = [before.stamp_ns, self.stamp_ns()?];
         Some(Integral {
-            sum: integral(&rates, [before.stamp_ns, scan.stamp_ns], self.max_gap_ns)?,
-            change: rate_at(&rates, scan.stamp_ns)? - rate_at(&rates, before.stamp_ns)?,
-            interval_s: seconds(scan.stamp_ns - before.stamp_ns),
+            sum: integral(&self.rates, stamps_ns, self.max_gap_ns)?,
+            change: rate_at(&self.rates, stamps_ns[1])? - rate_at(&self.rates, stamps_ns[0])?,
+            interval_s: seconds(stamps_ns[1] - stamps_ns[0]),
+            samples: self.rates.len() as u64,
         })
     }
 }
@@ -184,29 +197,30 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::samples::{Gyro, GyroConfig, Wheels, WheelsConfig};
+    use crate::samples::{Evidence, GyroConfig, WheelsConfig};
 
     const MS: i64 = 1_000_000;
     const SWEEP: i64 = 250 * MS;
 
     /// Of sweep after sweep of 250 ms, each stamped in its middle.
-    fn of<C: SensorConfig + Clone + Default>(first_sweep: i64, scans: &[&[Rate]]) -> Integrator<C> {
-        let mut rates = Integrator::new(&C::default());
+    fn of(config: &dyn SensorConfig, first_sweep: i64, scans: &[&[Rate]]) -> Integrator {
+        let mut rates = Integrator::new(config);
         for (k, of_scan) in (first_sweep..).zip(scans) {
             let span_ns = [k * SWEEP, (k + 1) * SWEEP];
-            rates.push(
-                &samples(rates.config.of(), of_scan),
-                k * SWEEP + SWEEP / 2,
-                span_ns,
-            );
+            rates.push(&samples(rates.of, of_scan), k * SWEEP + SWEEP / 2, span_ns);
         }
         rates
+    }
+
+    fn turn(first_sweep: i64, scans: &[&[Rate]]) -> Option<Evidence> {
+        let config = GyroConfig::default();
+        config.measure(&of(&config, first_sweep, scans))
     }
 
     /// The samples of these rates, with samples of all other kinds between them.
     fn samples(of: SampleKind, rates: &[Rate]) -> Vec<Sample> {
         let sample = |(ns, rate): &Rate| {
-            SampleKind::OF_SCANS.map(|kind| {
+            SampleKind::ALL.map(|kind| {
                 let value = if kind == of { *rate } else { 9.0 };
                 Sample::of(kind, *ns, [value; 6])
             })
@@ -232,33 +246,34 @@ mod tests {
             first in 0i64..100, every in 1usize..100, times in -30.0..30.0f64,
         ) {
             let all = ramp(first, 501, every);
-            let turn = of::<GyroConfig>(0, &split(&all)).turn().unwrap_or_default();
-            prop_assert!((turn.yaw_rad - 0.25 * 0.25).abs() < 1e-9, "{turn:?}");
+            let turn = turn(0, &split(&all)).unwrap_or_default();
+            prop_assert!((turn.value[0] - 0.25 * 0.25).abs() < 1e-9, "{turn:?}");
             // At the ends of a sweep the nearest sample holds.
-            let off = turn.sweep_rate_radps - 0.375;
+            let off = turn.value[1] - 0.375;
             prop_assert!(off.abs() < 1e-3 * every as f64, "{turn:?}");
             prop_assert_eq!(turn.interval_s, 0.25);
             let driven: Vec<Rate> = all.iter().map(|(ns, rate)| (*ns, times * rate)).collect();
-            let distance = of::<WheelsConfig>(0, &split(&driven)).distance().unwrap_or_default();
-            prop_assert!((distance.distance_m - times * 0.25 * 0.25).abs() < 1e-9, "{distance:?}");
-            let noise = WheelsConfig::default().noise_m_per_sqrt_m;
-            let least = noise.powi(2) * distance.distance_m.abs();
-            prop_assert!(distance.variance_m2 > least && distance.side_variance_m2 == least);
+            let config = WheelsConfig::default();
+            let distance = config.measure(&of(&config, 0, &split(&driven))).unwrap_or_default();
+            prop_assert!((distance.value[0] - times * 0.25 * 0.25).abs() < 1e-9, "{distance:?}");
+            let least = config.noise_m_per_sqrt_m.powi(2) * distance.value[0].abs();
+            prop_assert!(distance.covariance[0] > least && distance.covariance[2] == least);
         }
     }
 
     #[test]
     fn a_process_that_starts_at_the_scan_before_says_the_same() {
         let scans = [0, 250, 500].map(|from| ramp(from + 3, from + 250, 7));
-        let from = |first: usize| -> Gyro {
+        let config = GyroConfig::default();
+        let from = |first: usize| {
             let scans: Vec<&[Rate]> = scans[first..].iter().map(Vec::as_slice).collect();
-            of(first as i64, &scans)
+            let rates = of(&config, first as i64, &scans);
+            (config.measure(&rates), rates.means()[1])
         };
         let [whole, late, alone] = [0, 1, 2].map(from);
-        assert!(whole.turn().is_some());
-        assert_eq!(whole.turn(), late.turn());
-        assert_eq!(alone.turn(), None);
-        assert_eq!(whole.sweep_rates_radps()[1], alone.sweep_rates_radps()[1]);
+        assert!(whole.0.is_some());
+        assert_eq!(whole, late);
+        assert_eq!(alone, (None, whole.1));
     }
 
     #[test]
@@ -267,7 +282,7 @@ mod tests {
         let turn_without = |lost: std::ops::Range<i64>| {
             let is_kept = |(ns, _): &Rate| !lost.contains(&(ns / MS));
             let kept: Vec<Rate> = all.iter().copied().filter(is_kept).collect();
-            of::<GyroConfig>(0, &split(&kept)).turn()
+            turn(0, &split(&kept))
         };
         assert!(turn_without(0..0).is_some() && turn_without(200..300).is_some());
         for lost in [200..330, 0..250, 370..501, 0..501] {
@@ -279,7 +294,7 @@ mod tests {
     fn samples_of_a_dropped_scan_are_those_of_the_next_one() {
         let [first, second, third] = [0, 250, 500].map(|from| ramp(from + 1, from + 250, 10));
         let after_first = |dropped: &[Rate], next: &[Rate]| {
-            let mut wheels: Wheels = of(0, &[&first]);
+            let mut wheels = of(&WheelsConfig::default(), 0, &[&first]);
             wheels.drop_scan(&samples(SampleKind::Wheels, dropped));
             let span_ns = [500 * MS, 750 * MS];
             wheels.push(&samples(SampleKind::Wheels, next), 625 * MS, span_ns);

@@ -1,6 +1,6 @@
 use bytemuck::{Pod, Zeroable};
 
-use crate::samples::Geographic;
+use crate::samples::{Geographic, SampleKind};
 
 /// One measurement of a sensor beside the radar, as it is logged, and as it travels with a scan.
 #[repr(C)]
@@ -25,73 +25,6 @@ pub const MAX_SPEED_MPS: f64 = 150.0;
 /// The largest angular velocity of a sample, rad/s: 2000 degrees a second, the widest range of
 /// gyros of this kind.
 pub const MAX_RATE_RADPS: f64 = 35.0;
-
-/// The quantity that a sample measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum SampleKind {
-    /// Angular velocity about x, y, z (rad/s), then acceleration along them (m/s²).
-    Gyro = 1,
-    /// Speed along x (m/s), negative backwards.
-    Wheels = 2,
-    /// Place of the antenna: latitude and longitude (degrees), or east and north (m); altitude
-    /// above the ellipsoid (m), 0 where the log has none; standard deviation along each of both
-    /// axes (m), not above zero where the log has none; 1 if the receiver does not state whether it
-    /// had a fix. Fixes travel with no scan.
-    Gnss = 3,
-}
-
-/// The properties of a kind of samples.
-struct Row {
-    section: &'static str,
-    /// The numbers of values that a line of a datagram can have; none of a kind whose lines can be
-    /// without a measurement.
-    counts: &'static [usize],
-    /// The values at the front that are bounded, and their bound; `None`: it travels with no scan.
-    bounded: Option<(usize, f64)>,
-    /// The value that is integrated from scan to scan.
-    rate: usize,
-}
-
-impl SampleKind {
-    /// The kinds whose samples travel with the scans.
-    pub const OF_SCANS: [Self; 2] = [Self::Gyro, Self::Wheels];
-
-    const fn row(self) -> Row {
-        let (section, counts, bounded, rate): (_, &[usize], _, _) = match self {
-            Self::Gyro => ("gyro", &[3, 6], Some((3, MAX_RATE_RADPS)), 2),
-            Self::Wheels => ("wheels", &[1], Some((1, MAX_SPEED_MPS)), 0),
-            Self::Gnss => ("gnss", &[], None, 0),
-        };
-        Row {
-            section,
-            counts,
-            bounded,
-            rate,
-        }
-    }
-
-    pub const fn section(self) -> &'static str {
-        self.row().section
-    }
-
-    pub(super) const fn rate(self) -> usize {
-        self.row().rate
-    }
-
-    /// Parses a line of a datagram: a stamp, ns, and the values in their order, with commas
-    /// between. `None`: it is no sample.
-    pub fn parse(self, line: &str) -> Option<Sample> {
-        let (stamp_ns, rest) = line.split_once(',')?;
-        let parsed: Result<Vec<f64>, _> = rest.split(',').map(|it| it.trim().parse()).collect();
-        let parsed = parsed
-            .ok()
-            .filter(|it| self.row().counts.contains(&it.len()))?;
-        let mut values = [0.0; 6];
-        values[..parsed.len()].copy_from_slice(&parsed);
-        Some(Sample::of(self, stamp_ns.trim().parse().ok()?, values))
-    }
-}
 
 impl Sample {
     pub const fn of(kind: SampleKind, stamp_ns: i64, values: [f64; 6]) -> Self {
@@ -149,13 +82,11 @@ impl Sample {
     /// Returns whether it can travel with a scan: its kind does, all its values are finite, and its
     /// rates are within [`MAX_RATE_RADPS`], its speed within [`MAX_SPEED_MPS`].
     pub fn is_valid(&self) -> bool {
-        let mut kinds = SampleKind::OF_SCANS.into_iter();
-        let row = kinds.find(|kind| self.is(*kind)).map(SampleKind::row);
-        let is_measured = row
-            .and_then(|row| row.bounded)
-            .is_some_and(|(count, most)| {
-                self.values[..count].iter().all(|value| value.abs() <= most)
-            });
+        let mut kinds = SampleKind::ALL.into_iter();
+        let bounded = kinds.find_map(|kind| kind.bounded().filter(|_| self.is(kind)));
+        let is_measured = bounded.is_some_and(|(count, most)| {
+            self.values[..count].iter().all(|value| value.abs() <= most)
+        });
         is_measured && self.values.iter().all(|value| value.is_finite())
     }
 

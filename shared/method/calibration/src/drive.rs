@@ -2,11 +2,12 @@
 
 use gyre_geometry::{
     OwnedScan, PolarScan, Pose, Sense, SparsePoint, Twist, UncertainMotion,
+    samples::SensorConfigs,
     scan::{ScanError, flag},
 };
 use gyre_masking::MaskerError;
 use gyre_matching::{
-    Refiner, SettingError,
+    Refiner, Searched, SettingError,
     odometry::{Odometry, OdometryConfig, OdometryError, Outcome, SetupError},
 };
 use gyre_radar::PointExtractor;
@@ -156,7 +157,11 @@ impl Drive {
     /// Registers all scans under changed facts, in the order of time or against it.
     fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, SettingError> {
         let count = self.sweeps.len();
-        let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;
+        let mut refiner = Refiner::new(
+            &self.config.refinement,
+            &SensorConfigs::default(),
+            self.config.points.capacity,
+        )?;
         let mut motions = vec![UncertainMotion::identity(); count];
         let mut earlier: Option<(usize, Vec<SparsePoint>)> = None;
         for number in 0..count {
@@ -178,8 +183,13 @@ impl Drive {
                         true => sweep.searched.inverse(),
                         false => sweep.searched,
                     };
-                    let refined =
-                        refiner.refine(number as u64, &points, from, &searched, sweep.interval_s);
+                    let refined = refiner.refine(&Searched::by_radar(
+                        number as u64,
+                        &points,
+                        from,
+                        &searched,
+                        sweep.interval_s,
+                    ));
                     motions[later] = refined.motion.alone();
                     if reversed {
                         motions[later].motion = motions[later].motion.inverse();

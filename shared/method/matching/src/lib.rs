@@ -42,9 +42,9 @@ pub use gyre_geometry::SettingError;
 pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{
-    Aiding, Anchor, Heading, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined,
-    RefinementConfig, RefinementKind, Refiner, Standstill, Submap, TrackerState, Verdict,
-    WheelState, Witnessed,
+    Anchor, Filter, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined, RefinementConfig,
+    RefinementKind, Refiner, Searched, SinceMatch, Standstill, Submap, TrackerState, Verdict,
+    Witnessed,
 };
 pub use rotation::{RotationMatch, RotationRunnerUp, RotationSearch};
 pub use sequential::SequentialRotation;

@@ -15,13 +15,13 @@ mod search;
 
 use gyre_geometry::{
     ComposedMotion, LostAzimuths, OdometryMotion, PolarScan, SparsePoint, Twist, UncertainMotion,
-    samples::{DopplerVelocity, Gyro, Sample, Wheels, with_yaw_rate},
+    samples::{Evidence, Sample, SampledSensors, Witness},
 };
 use gyre_masking::Masker;
 use gyre_radar::{DopplerEstimator, LostAzimuthFinder, NoDoppler, PlacedRows};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
-use crate::{JointMatch, Refined, Refiner};
+use crate::{JointMatch, Refined, Refiner, Searched};
 use compensation::LaggedTwists;
 
 pub use config::{OdometryConfig, SearchConfig, SearchKind};
@@ -38,11 +38,10 @@ pub struct Odometry {
     refiner: Option<Refiner>,
     /// The velocities of earlier scans, for motion compensation.
     twists: LaggedTwists,
-    gyro: Gyro,
-    wheels: Wheels,
+    sensors: SampledSensors,
     doppler: Option<DopplerEstimator>,
     /// The velocity of the last scan, measured by `doppler`.
-    velocity: Option<Result<DopplerVelocity, NoDoppler>>,
+    velocity: Option<Result<Evidence, NoDoppler>>,
     min_range_m: f32,
     finder: LostAzimuthFinder,
     /// Where azimuths of the last scan were lost, and a buffer for its rows at their bearings.
@@ -71,9 +70,12 @@ impl Odometry {
             search: parts.search,
             refiner: parts.refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
-            gyro: Gyro::new(&config.gyro),
-            wheels: Wheels::new(&config.wheels),
-            doppler: config.doppler.is_used().then(DopplerEstimator::default),
+            sensors: SampledSensors::new(&config.sensors),
+            doppler: config
+                .sensors
+                .doppler
+                .is_used()
+                .then(DopplerEstimator::default),
             velocity: None,
             min_range_m: config.points.min_range_m,
             finder: LostAzimuthFinder::default(),
@@ -102,17 +104,14 @@ impl Odometry {
             self.restart();
         }
         let (stamp_ns, span_ns) = (scan.geometry.stamp_ns, scan.span_ns());
-        self.gyro.push(samples, stamp_ns, span_ns);
-        self.wheels.push(samples, stamp_ns, span_ns);
-        self.pair.turn = self.gyro.turn();
-        self.pair.distance = self.wheels.distance();
+        self.sensors.push(samples, stamp_ns, span_ns);
+        self.pair.later.evidence = self.sensors.evidence();
         // The compensation needs a velocity before the search: an earlier one, turning as measured.
-        let [_, rate] = self.gyro.sweep_rates_radps();
-        let masked = self.mask(scan, with_yaw_rate(self.twists.next(), rate));
+        let [_, twist] = self.sensors.with_yaw_rates([None, self.twists.next()]);
+        let masked = self.mask(scan, twist);
         if masked.is_err() {
             // They would measure the next motion from the scan that is skipped.
-            self.gyro.clear();
-            self.wheels.clear();
+            self.sensors.clear();
         }
         masked?;
         let searched = self.search()?;
@@ -136,7 +135,8 @@ impl Odometry {
         let doppler = self.doppler.as_mut();
         self.velocity = doppler.map(|it| it.estimate(&placed, self.min_range_m));
         let velocity = self.velocity.as_ref().and_then(|it| it.as_ref().ok());
-        self.pair.later.velocity = velocity.copied();
+        let velocity = velocity.copied().unwrap_or_default();
+        self.pair.later.evidence[Witness::Doppler as usize] = velocity;
         let variance_rad2 = self.lost.variance_of_mean_rad2(scan.geometry.azimuths);
         self.pair.later.azimuth_variance_rad2 = variance_rad2;
         Ok(())
@@ -155,11 +155,16 @@ impl Odometry {
     pub fn refine(&mut self, searched: &JointMatch) -> Option<Refined> {
         let refiner = self.refiner.as_mut()?;
         let pair = &self.pair;
-        refiner.aiding = pair.aiding();
-        let (later, earlier) = (pair.later_points(), pair.earlier_points());
-        let searched = searched.motion.pose();
-        let interval_s = pair.interval_ns() as f64 * 1e-9;
-        Some(refiner.refine(pair.seq(), later, earlier, &searched, interval_s))
+        let [earlier, later] = [&pair.earlier, &pair.later];
+        Some(refiner.refine(&Searched {
+            scan: pair.seq(),
+            later: later.points(),
+            earlier: earlier.points(),
+            motion: searched.motion.pose(),
+            interval_s: pair.interval_ns() as f64 * 1e-9,
+            azimuth_variance_rad2: earlier.azimuth_variance_rad2 + later.azimuth_variance_rad2,
+            evidence: [&earlier.evidence, &later.evidence],
+        }))
     }
 
     /// Composes the motion with the pose (Checchin et al., Eqs. 1 and 2; see [`ComposedMotion`]).
@@ -193,8 +198,7 @@ impl Odometry {
     pub fn restart(&mut self) {
         self.pair.seq = 0;
         self.twists.clear();
-        self.gyro.clear();
-        self.wheels.clear();
+        self.sensors.clear();
         self.finder.reset();
         if let Some(refiner) = &mut self.refiner {
             refiner.reset();
@@ -229,7 +233,7 @@ impl Odometry {
 
     /// Returns the velocity of the radar by the Doppler shift of the last scan, or the reason for
     /// its absence; `None` before the first scan, and without `[doppler]`.
-    pub fn doppler(&self) -> Option<&Result<DopplerVelocity, NoDoppler>> {
+    pub fn doppler(&self) -> Option<&Result<Evidence, NoDoppler>> {
         self.velocity.as_ref()
     }
 

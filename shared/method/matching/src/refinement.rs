@@ -4,50 +4,49 @@
 //! blurred and saturated. A scan is aligned with it by Gauss-Newton steps, first on a coarse map
 //! and then on the fine one, and is deskewed with the very motion that is sought.
 
-mod aiding;
 mod alignment;
 mod along_walls;
+mod candidates;
 mod config;
-mod heading;
+mod filter;
 mod keyframe_aligner;
 mod local_map;
 mod map_level;
 mod normal_equations;
 mod points;
+mod predicted;
 mod registration;
+mod sensors;
 mod standstill;
 mod structure;
 mod submap;
 mod tracker;
 mod uncertainty;
-mod wheels;
 
-pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{
     OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion,
-    samples::{
-        DopplerConfig, DopplerDisplacement, DopplerVelocity, GyroConfig, GyroTurn, WheelDistance,
-        WheelsConfig,
-    },
+    samples::{AllEvidence, Evidence, SensorConfigs, Witness},
 };
-pub use heading::{Heading, Verdict};
-pub use keyframe_aligner::KeyframeAligner;
-pub use local_map::Keyframe;
 use nalgebra::{Matrix3, UnitVector2, Vector2};
-pub use standstill::Standstill;
-pub use submap::Submap;
-pub use tracker::{Anchor, TrackerState};
-pub use wheels::WheelState;
 
 use crate::SettingError;
 use alignment::Alignment;
+use candidates::{Candidate, Candidates, Scan};
+use filter::SharedErrors;
 use local_map::LocalMap;
 use points::DeskewedPoints;
-pub use registration::InitialGuess;
-use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
-use tracker::Step;
 use uncertainty::Uncertainty;
+
+pub use candidates::InitialGuess;
+pub use config::{RefinementConfig, RefinementKind};
+pub use filter::{Filter, Verdict};
+pub use keyframe_aligner::KeyframeAligner;
+pub use local_map::Keyframe;
+pub use predicted::SinceMatch;
+pub use standstill::Standstill;
+pub use submap::Submap;
+pub use tracker::{Anchor, TrackerState};
 
 /// After this many doubtful scans in a row a plausible match is accepted.
 const MAX_DOUBTFUL: u32 = 2;
@@ -80,24 +79,25 @@ pub struct Refined {
     /// The initial guess of the accepted match; the prediction without a match.
     pub guess: InitialGuess,
     pub stationary: bool,
-    /// The sensors that have measured the motion.
-    pub gyro: Option<Witnessed>,
-    pub wheels: Option<Witnessed>,
-    pub doppler: Option<Witnessed>,
+    /// The sensors that have measured the motion, in the order of [`Witness::ALL`].
+    pub witnesses: [Option<Witnessed>; Witness::ALL.len()],
 }
 
 /// A sensor beside the radar in a motion, and its errors after the scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Witnessed {
     pub verdict: Verdict,
-    /// The turn (rad) or the distance (m) that it measured.
+    /// The turn (rad), the distance (m) or the heading (rad) that it measured.
     pub measured: f64,
     /// True value over the measured one.
     pub scale: f64,
     pub scale_sigma: f64,
-    /// Bias, rad/s; zero of a sensor of the distance.
+    /// Bias, rad/s; the offset of an absolute heading, rad; zero of a distance.
     pub bias: f64,
     pub bias_sigma: f64,
+    /// Delay of its stamps beyond the configured one, s.
+    pub delay_s: f64,
+    pub delay_sigma_s: f64,
 }
 
 struct Accepted {
@@ -111,134 +111,116 @@ struct Accepted {
     leaves_map: bool,
 }
 
-/// Measurements about the motion between the next two scans, beside their points.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Aiding {
+/// A searched motion, and the scans and measurements to refine it with.
+#[derive(Debug, Clone, Copy)]
+pub struct Searched<'a> {
+    /// The number of the later scan.
+    pub scan: u64,
+    pub later: &'a [SparsePoint],
+    /// Used only while the map is empty.
+    pub earlier: &'a [SparsePoint],
+    /// The motion that the search found.
+    pub motion: Pose,
+    /// Time between the stamps, s.
+    pub interval_s: f64,
     /// Variance of the turn by the mean azimuths of both scans, rad². Where azimuths were lost, all
     /// points of a sector err alike, and the mean azimuth by its share of the turn; the motion
     /// takes back the error of the earlier scan.
     pub azimuth_variance_rad2: f32,
-    /// The turn by the gyro and the distance by the wheels; `None` where samples are missing.
-    pub turn: Option<GyroTurn>,
-    pub distance: Option<WheelDistance>,
-    /// The velocities by Doppler of the earlier scan and of the later one, if a scan determines it.
-    pub velocities: [Option<DopplerVelocity>; 2],
+    /// The evidence that came with the earlier scan and with the later one.
+    pub evidence: [&'a AllEvidence; 2],
+}
+
+impl<'a> Searched<'a> {
+    /// A searched motion that no other sensor has measured.
+    pub fn by_radar(
+        scan: u64,
+        later: &'a [SparsePoint],
+        earlier: &'a [SparsePoint],
+        motion: &Pose,
+        interval_s: f64,
+    ) -> Self {
+        const NONE: AllEvidence = [Evidence::NONE; Witness::ALL.len()];
+        Self {
+            scan,
+            later,
+            earlier,
+            motion: *motion,
+            interval_s,
+            azimuth_variance_rad2: 0.0,
+            evidence: [&NONE; 2],
+        }
+    }
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
 #[derive(Debug)]
 pub struct Refiner {
     config: RefinementConfig,
-    gyro: GyroConfig,
-    wheels: WheelsConfig,
-    doppler: DopplerConfig,
-    doppler_as_wheels: WheelsConfig,
+    sensors: SensorConfigs,
+    errors: [SharedErrors; Witness::ALL.len()],
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
     other_points: DeskewedPoints,
-    pub aiding: Aiding,
-    displacement: Option<DopplerDisplacement>,
 }
 
 impl Refiner {
-    pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, SettingError> {
+    /// Plans refinements of scans of at most `capacity` points.
+    pub fn new(
+        config: &RefinementConfig,
+        sensors: &SensorConfigs,
+        capacity: usize,
+    ) -> Result<Self, SettingError> {
         config.validate()?;
         Ok(Self {
             map: LocalMap::new(config),
             config: config.clone(),
-            gyro: GyroConfig::default(),
-            wheels: WheelsConfig::default(),
-            doppler: DopplerConfig::default(),
-            doppler_as_wheels: DopplerConfig::default().as_wheels(),
+            sensors: sensors.clone(),
+            errors: SharedErrors::of(sensors),
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
             other_points: DeskewedPoints::with_capacity(capacity),
-            aiding: Aiding::default(),
-            displacement: None,
         })
     }
 
-    /// Uses aiding sensors of these kinds: the measurements are in [`Refiner::aiding`].
-    #[must_use]
-    pub fn with_sensors(
-        mut self,
-        gyro: &GyroConfig,
-        wheels: &WheelsConfig,
-        doppler: &DopplerConfig,
-    ) -> Self {
-        (self.gyro, self.wheels) = (gyro.clone(), wheels.clone());
-        (self.doppler, self.doppler_as_wheels) = (doppler.clone(), doppler.as_wheels());
-        self
-    }
-
-    /// Refines the motion from the `earlier` scan to the `later` one, which has number `scan`.
-    ///
-    /// `searched` is the motion that the search found, `interval_s` the time between the stamps.
-    /// The earlier points are used only while the map is empty.
-    pub fn refine(
-        &mut self,
-        scan: u64,
-        later: &[SparsePoint],
-        earlier: &[SparsePoint],
-        searched: &Pose,
-        interval_s: f64,
-    ) -> Refined {
-        // Stamps that do not advance give no velocity: a second is assumed.
-        let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
-        self.displacement = self.displacement_by_doppler(interval_s);
-        let mut scan = Scan {
-            id: scan,
-            points: later,
-            searched: self.state.pose * searched,
-            step: Step {
-                interval_s,
-                turn: self.predict_turn(interval_s),
-                distance: self.predict_distance(interval_s),
-            },
-        };
-        let predictions = self.ensure_map(&scan, earlier);
+    /// Refines the motion from the earlier scan to the later one.
+    pub fn refine(&mut self, searched: &Searched<'_>) -> Refined {
+        let mut scan = self.predicted_scan(searched);
+        let predictions = self.ensure_map(&scan, searched.earlier);
         let mut best = self.best_match(&mut scan);
-        let uncertainty =
-            Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
+        let (map, state, config) = (&self.map, &self.state, &self.config);
+        let uncertainty = Uncertainty::before(&scan, map, state, predictions, config);
         let accepted = self.accept_or_predict(&scan, &mut best, &uncertainty);
-        let outcome = accepted.outcome;
-        let by_gyro = self.aiding.turn.zip(self.state.heading);
-        let by_wheels = self.aiding.distance.zip(self.state.wheels);
-        let by_doppler = self.displacement.zip(self.state.doppler);
-        let mut report = self.hold_standstill(&scan, &accepted);
-        if let (false, Some(heading)) = (report.stationary, &mut self.state.heading) {
-            report.motion.motion = heading.correct(&report.motion.motion);
-        }
+        self.observe_headings(&scan, &accepted.pose.motion);
+        let witnesses = self.witnessed(&scan);
+        let report = self.report(&scan, &accepted);
         self.update(&scan, &best, &accepted);
         Refined {
             motion: OdometryMotion {
                 motion: report.motion.motion,
                 covariance: uncertainty.of_report(&report),
-                drift_share: uncertainty.drift_share(outcome, &self.map),
+                drift_share: uncertainty.drift_share(accepted.outcome, &self.map),
                 scale_sigma: self.config.scale_sigma,
             },
             overlap: best.overlap,
             support: best.support,
             guess: accepted.guess,
-            outcome,
+            outcome: accepted.outcome,
             stationary: report.stationary,
-            gyro: by_gyro.map(|(turn, it)| it.witnessed(turn.yaw_rad)),
-            wheels: by_wheels.map(|(measured, it)| it.witnessed(measured.distance_m)),
-            doppler: by_doppler.map(|(measured, it)| it.witnessed(measured.ahead.distance_m)),
+            witnesses,
         }
     }
 
-    /// Forgets the map and the tracker state but for the bias of the gyro and the scales of wheels
-    /// and Doppler: the next scan starts a new chain of motions.
+    /// Forgets the map and the tracker state but for the filters of the sensors: the next scan
+    /// starts a new chain of motions.
     pub fn reset(&mut self) {
         self.map.clear();
         self.state.leave_map();
-        self.state.heading.iter_mut().for_each(Heading::start_chain);
+        let filters = self.state.filters.iter_mut().flatten();
+        filters.for_each(Filter::start_chain);
         self.state = TrackerState {
-            heading: self.state.heading,
-            wheels: self.state.wheels,
-            doppler: self.state.doppler,
+            filters: self.state.filters,
             ..TrackerState::default()
         };
     }
@@ -262,6 +244,21 @@ impl Refiner {
         self.map.keyframe_cells()
     }
 
+    fn predicted_scan<'a>(&mut self, searched: &Searched<'a>) -> Scan<'a> {
+        // Stamps that do not advance give no velocity: a second is assumed.
+        let interval_s = match searched.interval_s > 0.0 {
+            true => searched.interval_s,
+            false => 1.0,
+        };
+        Scan {
+            id: searched.scan,
+            points: searched.later,
+            searched: self.state.pose * searched.motion,
+            step: self.predict(searched.evidence, interval_s),
+            azimuth_variance_rad2: searched.azimuth_variance_rad2.into(),
+        }
+    }
+
     /// Starts a map if the refiner has no map. Returns the number of predictions in a row whose
     /// error a match takes back: none with a new map, which starts at the pose that they led to,
     /// with their error.
@@ -279,15 +276,15 @@ impl Refiner {
         let (id, pose) = (scan.id.wrapping_sub(1), self.state.pose);
         let twist = self.state.twist_to(&scan.searched, &scan.step);
         self.insert_keyframe(id, earlier, &pose, &twist);
-        let aligned = self.registration(scan).match_prediction_or_search();
+        let aligned = self.candidates(scan).match_prediction_or_search();
         let pose_of_later = aligned.alignment.pose;
         let twist = self.state.twist_to(&pose_of_later, &scan.step);
         self.map.clear();
         self.insert_keyframe(id, earlier, &pose, &twist);
     }
 
-    fn registration<'a>(&'a mut self, scan: &'a Scan<'a>) -> Registration<'a> {
-        Registration {
+    fn candidates<'a>(&'a mut self, scan: &'a Scan<'a>) -> Candidates<'a> {
+        Candidates {
             scan,
             map: &self.map,
             state: &self.state,
@@ -319,7 +316,7 @@ impl Refiner {
         };
         if best.guess == InitialGuess::AlongWalls {
             self.propagate_along_walls(scan, &registered);
-        } else if self.update_distance(scan, &registered, is_certain) {
+        } else if self.update_distances(scan, &registered, is_certain) {
             (self.state.along_walls, self.state.sliding) = (0, 0);
         } else {
             return self.predicted(scan, uncertainty);
@@ -336,37 +333,32 @@ impl Refiner {
 
     /// Returns the pose of an alignment with the covariance of the motion to it; `None` if the
     /// points do not determine it.
-    fn registered(&self, alignment: &Alignment) -> Option<UncertainMotion> {
+    fn registered(&self, scan: &Scan<'_>, alignment: &Alignment) -> Option<UncertainMotion> {
         let (points, previous) = (&self.points, &self.state.pose);
         let covariance = uncertainty::of_alignment(alignment, points, previous, &self.config)?;
         Some(UncertainMotion {
             motion: alignment.pose,
             covariance: covariance
-                + uncertainty::by_azimuths(alignment, self.aiding.azimuth_variance_rad2.into()),
+                + uncertainty::by_azimuths(alignment, scan.azimuth_variance_rad2),
         })
     }
 
     fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> Accepted {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction;
-        if let Some(heading) = &mut self.state.heading {
-            match &scan.step.turn {
-                Some(turn) => heading.take_prediction(&motion, &self.state.pose, turn),
-                None => heading.inflate(covariance[(2, 2)]),
-            }
-        }
+        let pose = UncertainMotion { motion, covariance };
         let alone = UncertainMotion {
             motion: self.state.pose.inv_mul(&motion),
             covariance,
         };
-        self.propagate_distances(scan, &alone);
+        self.propagate(scan, &pose, &alone);
         let ahead_m = match self.state.sliding > 0 && scan.step.distance.is_none() {
             true => scan.searched.translation.vector - motion.translation.vector,
             false => Vector2::zeros(),
         };
         Accepted {
             outcome: Outcome::Predicted,
-            pose: UncertainMotion { motion, covariance },
+            pose,
             covariance,
             guess: InitialGuess::Prediction,
             ahead_m,
@@ -406,6 +398,15 @@ impl Refiner {
         }
         apart.translation.vector.norm() <= SEARCH_AGREES_M
             && apart.rotation.angle().abs() <= SEARCH_AGREES_DEG.to_radians()
+    }
+
+    /// Returns the motion to the estimated pose, with the heading of the gyro's filter.
+    fn report(&mut self, scan: &Scan<'_>, accepted: &Accepted) -> Report {
+        let mut report = self.hold_standstill(scan, accepted);
+        if let (false, Some(heading)) = (report.stationary, self.state.heading_mut()) {
+            report.motion.motion = heading.correct(&report.motion.motion);
+        }
+        report
     }
 
     /// Returns the motion to the estimated pose; none while the vehicle stands. Displacement along

@@ -3,8 +3,8 @@
 //! Bounds are about twice the worst that was measured over a few scenes.
 
 use crate::common::scenes::*;
-use gyre_geometry::{Pose, SparsePoint, mirrored};
-use gyre_matching::{Aiding, Outcome, TrackerState};
+use gyre_geometry::{Pose, SparsePoint, mirrored, samples::AllEvidence};
+use gyre_matching::{Outcome, TrackerState};
 use nalgebra::Vector2;
 
 /// The area visible along [`straight`].
@@ -91,9 +91,9 @@ fn mirrored_points_give_the_mirrored_motion() {
         let flip_all = |scan: &Vec<SparsePoint>| scan.iter().map(flip).collect();
         let flipped: Vec<Vec<SparsePoint>> = scans.iter().map(flip_all).collect();
         let search = |k: usize| searched(&drive, k - 1);
-        let one = refine_aided(&mut refiner(), &scans, |_| Aiding::default(), search);
+        let one = refine_aided(&mut refiner(), &scans, |_| AllEvidence::default(), search);
         let search = |k: usize| mirrored(&searched(&drive, k - 1));
-        let other = refine_aided(&mut refiner(), &flipped, |_| Aiding::default(), search);
+        let other = refine_aided(&mut refiner(), &flipped, |_| AllEvidence::default(), search);
         let [one, other] = [one, other].map(|refined| {
             let driven = |count| {
                 let motions = refined[..count].iter().map(|it| it.motion.motion);

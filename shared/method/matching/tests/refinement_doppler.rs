@@ -2,9 +2,9 @@
 
 use gyre_geometry::{
     SparsePoint,
-    samples::{DopplerConfig, DopplerKind, DopplerVelocity, GyroConfig, WheelsConfig},
+    samples::{DopplerKind, Evidence, SensorConfigs, Witness},
 };
-use gyre_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner, Verdict};
+use gyre_matching::{InitialGuess, Outcome, Refined, Refiner, Verdict, Witnessed};
 
 use crate::common::{Numbers, scenes::*};
 
@@ -16,11 +16,13 @@ const SCALE: f64 = 0.98;
 const SIGMA_MPS: f64 = 0.05;
 
 fn witnessed() -> Refiner {
-    let doppler = DopplerConfig {
-        kind: DopplerKind::Auto,
-        ..DopplerConfig::default()
-    };
-    refiner().with_sensors(&GyroConfig::default(), &WheelsConfig::default(), &doppler)
+    let mut sensors = SensorConfigs::default();
+    sensors.doppler.kind = DopplerKind::Auto;
+    refiner_with(&sensors)
+}
+
+fn doppler(refined: &Refined) -> Option<Witnessed> {
+    refined.witnesses[Witness::Doppler as usize]
 }
 
 /// Refines the motions to these scans. Each scan measures the true velocity times a factor, with
@@ -34,17 +36,16 @@ fn refine_with(
         let mut numbers = Numbers(0xd0 + k as u64);
         let mut noise_mps = || SIGMA_MPS * 3.0_f64.sqrt() * numbers.within(1.0);
         let speed_mps = factor(k)? * drive.speed(k as f64 * SWEEP_S);
-        Some(DopplerVelocity {
-            velocity_mps: [speed_mps + noise_mps(), noise_mps()],
+        Some(Evidence {
+            samples: 200,
+            interval_s: 0.0,
+            value: [speed_mps + noise_mps(), noise_mps()],
+            change: 0.0,
             covariance: [SIGMA_MPS.powi(2), 0.0, SIGMA_MPS.powi(2)],
-            bearings: 200,
         })
     };
-    let aiding = |k: usize| Aiding {
-        velocities: [velocity(k - 1), velocity(k)],
-        ..Aiding::default()
-    };
-    refine_aided(refiner, scans, aiding, search_until(INSIDE, drive))
+    let evidence = |k: usize| evidence_of(Witness::Doppler, velocity(k));
+    refine_aided(refiner, scans, evidence, search_until(INSIDE, drive))
 }
 
 #[test]
@@ -61,7 +62,7 @@ fn in_a_tunnel_doppler_says_how_far() {
     // Two percent of 140 m; the scale was estimated before.
     assert!(off.translation.x.abs() < 2.8, "{off}");
     assert!(off.translation.x.abs() < 3.0 * sigma_m && sigma_m < 3.0);
-    let scale = refined[SCANS - 2].doppler.unwrap();
+    let scale = doppler(&refined[SCANS - 2]).unwrap();
     let apart = scale.scale - 1.0 / SCALE;
     assert!(apart.abs() < 3.0 * scale.scale_sigma, "{scale:?}");
     assert!(
@@ -100,9 +101,7 @@ fn a_velocity_that_a_certain_match_contradicts_is_refused_and_changes_no_motion(
     // Beside a bus, which fills most bearings.
     let captured = |k: usize| Some(if (20..26).contains(&k) { 1.5 } else { 1.0 });
     let refined = refine_with(&mut witnessed(), (&drive, scans), captured);
-    let refused = scans_where(&refined, |it| {
-        it.doppler.is_some_and(|it| it.verdict == Verdict::Refused)
-    });
+    let refused = judged(&refined, Witness::Doppler, Verdict::Refused);
     // The way from the last of them has half of its error, which is within the gate once the
     // vehicle is slow.
     assert!(
@@ -124,7 +123,7 @@ fn without_the_section_velocities_change_no_bit() {
     let poses = |refined: &[Refined]| -> Vec<_> {
         refined
             .iter()
-            .map(|it| (it.motion.motion, it.motion.covariance, it.doppler))
+            .map(|it| (it.motion.motion, it.motion.covariance, doppler(it)))
             .collect()
     };
     let told = refine_with(&mut refiner(), (&drive, scans), |_| Some(1.0));

@@ -3,7 +3,7 @@
 
 use crate::common::scenes::*;
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
-use gyre_matching::{Outcome, Refined, Refiner};
+use gyre_matching::{Outcome, Refined, Refiner, Searched};
 
 /// A gentle bend and its 60 scans.
 fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
@@ -187,7 +187,9 @@ fn stamps_that_do_not_advance_are_bridged() {
         let mut refiner = refiner();
         let mut refined = refine_on(&mut refiner, &drive, &scans, 0..20);
         let search = searched(&drive, 20);
-        refined.push(refiner.refine(21, &scans[21], &scans[20], &search, interval_s));
+        refined.push(refiner.refine(&Searched::by_radar(
+            21, &scans[21], &scans[20], &search, interval_s,
+        )));
         refined.extend(refine_on(&mut refiner, &drive, &scans, 21..59));
         let run = Run { drive, refined };
         run.refined.iter().for_each(sane);
@@ -235,10 +237,44 @@ fn a_restored_refiner_continues_bit_for_bit() {
 fn a_chain_may_start_with_any_scan_number() {
     let (drive, scans) = bend();
     let mut refiner = refiner();
-    let refined = refiner.refine(0, &scans[1], &scans[0], &searched(&drive, 0), SWEEP_S);
+    let refined = refiner.refine(&Searched::by_radar(
+        0,
+        &scans[1],
+        &scans[0],
+        &searched(&drive, 0),
+        SWEEP_S,
+    ));
     sane(&refined);
     let off = drive.pose(1).inv_mul(&refined.motion.motion);
     assert!(off.translation.vector.norm() < 0.2 && refiner.state().pose != Pose::identity());
+}
+
+/// A scan that is turned as a whole by an angle that a vehicle can turn, as by a slip of the
+/// encoder: the covariances of the motions to it and from it have the jump.
+#[test]
+fn a_scan_that_is_turned_as_a_whole_widens_the_covariance() {
+    let (drive, mut scans) = bend();
+    let sigmas = |scans: &[Vec<SparsePoint>]| -> Vec<f64> {
+        let refined = refine(&drive, scans).refined;
+        refined
+            .iter()
+            .map(|it| it.motion.covariance[(2, 2)].sqrt())
+            .collect()
+    };
+    let before = sigmas(&scans);
+    let jump_rad = 6.6_f64.to_radians();
+    let (sin, cos) = (jump_rad as f32).sin_cos();
+    for point in &mut scans[30] {
+        let [x, y] = [point.x_m, point.y_m];
+        (point.x_m, point.y_m) = (cos * x - sin * y, sin * x + cos * y);
+    }
+    let after = sigmas(&scans);
+    assert!(before.iter().all(|sigma| *sigma < 0.02), "{before:?}");
+    assert!(
+        after[29..31].iter().all(|sigma| *sigma > 0.7 * jump_rad),
+        "{after:?}"
+    );
+    assert!(after[33..].iter().all(|sigma| *sigma < 0.02), "{after:?}");
 }
 
 #[test]
@@ -251,7 +287,13 @@ fn the_variance_of_a_predicted_pose_grows_with_the_square_of_the_predictions() {
     for k in 1..scans.len() {
         let later: &[_] = if k < 10 { &scans[k] } else { &[] };
         let search = searched(&drive, k - 1);
-        let refined = refiner.refine(k as u64, later, &scans[k - 1], &search, SWEEP_S);
+        let refined = refiner.refine(&Searched::by_radar(
+            k as u64,
+            later,
+            &scans[k - 1],
+            &search,
+            SWEEP_S,
+        ));
         assert_eq!(refined.outcome == Outcome::Predicted, k >= 10, "{k}");
         if k >= 10 {
             variances.push(refined.motion.covariance[(0, 0)]);

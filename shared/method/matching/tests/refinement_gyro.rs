@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use gyre_geometry::{
     SparsePoint, pose,
-    samples::{DopplerConfig, GyroConfig, WheelsConfig},
+    samples::{GyroConfig, SensorConfigs, Witness},
 };
-use gyre_matching::{Aiding, Outcome, Refined, Verdict};
+use gyre_matching::{Outcome, Refined, Verdict};
 
 use crate::common::scenes::*;
 
@@ -27,37 +27,33 @@ fn refine_with(
     off_radps: impl Fn(usize) -> f64,
 ) -> Vec<Refined> {
     const REACH_RAD: f64 = 0.07;
-    let (wheels, doppler) = (WheelsConfig::default(), DopplerConfig::default());
-    let mut refiner = refiner().with_sensors(gyro, &wheels, &doppler);
-    let aiding = |k: usize| Aiding {
-        turn: Some(by_gyro(drive, off_radps(k))),
-        ..Aiding::default()
-    };
+    let mut refiner = refiner_with(&SensorConfigs {
+        gyro: gyro.clone(),
+        ..SensorConfigs::default()
+    });
+    let evidence = |k: usize| evidence_of(Witness::Gyro, Some(by_gyro(drive, off_radps(k))));
     let search = |k: usize| {
         let misled_rad = off_radps(k) * SWEEP_S;
         let misled_rad = misled_rad - misled_rad.clamp(-REACH_RAD, REACH_RAD);
         drive.pose(k - 1).inv_mul(&drive.pose(k)) * pose(0.0, 0.0, misled_rad)
     };
-    refine_aided(&mut refiner, scans, aiding, search)
-}
-
-fn judged(refined: &[Refined], verdict: Verdict) -> Vec<usize> {
-    scans_where(refined, |it| {
-        it.gyro.is_some_and(|it| it.verdict == verdict)
-    })
+    refine_aided(&mut refiner, scans, evidence, search)
 }
 
 #[test]
 fn a_gyro_is_refused_exactly_where_it_is_wrong_and_the_path_is_that_of_the_radar() {
     let (drive, scans) = bend();
     let good = refine_with(&GyroConfig::default(), (&drive, &scans), |_| 0.0);
-    assert_eq!(judged(&good, Verdict::Agrees).len(), SCANS - 1);
+    assert_eq!(
+        judged(&good, Witness::Gyro, Verdict::Agrees).len(),
+        SCANS - 1
+    );
     let (undisturbed, _) = off(&drive, &good, 0..SCANS - 1);
     for off_radps in [-3.0, -0.5, 0.5, 1.0, 3.0] {
         let wrong = |k: usize| if WRONG.contains(&k) { off_radps } else { 0.0 };
         let refined = refine_with(&GyroConfig::default(), (&drive, &scans), wrong);
         assert_eq!(
-            judged(&refined, Verdict::Refused),
+            judged(&refined, Witness::Gyro, Verdict::Refused),
             WRONG.collect::<Vec<_>>(),
             "{off_radps} rad/s"
         );
@@ -89,7 +85,7 @@ fn a_gyro_that_was_refused_last_does_not_turn_a_blind_vehicle() {
         assert!(off_rad.abs() < 0.02, "scan {k}: {off_rad} rad");
     }
     let all: Vec<usize> = (WRONG.start..SCANS).collect();
-    assert_eq!(judged(&refined, Verdict::Refused), all);
+    assert_eq!(judged(&refined, Witness::Gyro, Verdict::Refused), all);
 }
 
 /// A gyro that is wrong once by two degrees, and a scan that is turned by two degrees as a whole:
@@ -108,8 +104,8 @@ fn a_single_error_of_the_gyro_or_of_a_scan_is_doubted_and_the_next_match_decides
     }
     let by_scan = refine_with(&GyroConfig::default(), (&drive, &scans), |_| 0.0);
     for (refined, refused) in [(&by_gyro, vec![start + 1]), (&by_scan, vec![])] {
-        assert_eq!(judged(refined, Verdict::Doubted), [start]);
-        assert_eq!(judged(refined, Verdict::Refused), refused);
+        assert_eq!(judged(refined, Witness::Gyro, Verdict::Doubted), [start]);
+        assert_eq!(judged(refined, Witness::Gyro, Verdict::Refused), refused);
         let sigma_rad = refined[start - 1].motion.covariance[(2, 2)].sqrt();
         assert!(sigma_rad > 0.8 * error_rad, "{sigma_rad} rad");
         let (displacement, _) = off(&drive, refined, 0..SCANS - 1);
@@ -133,7 +129,7 @@ fn a_gyro_whose_learnt_scale_is_implausible_is_not_used_any_more() {
     for (by, is_refused) in [(0.03, false), (-0.06, true), (0.06, true)] {
         let off_radps = |_| by * drive.yaw_rate_radps;
         let refined = refine_with(&config, (&drive, &scans), off_radps);
-        let refused = judged(&refined, Verdict::Refused);
+        let refused = judged(&refined, Witness::Gyro, Verdict::Refused);
         let from = refused.first().map_or(SCANS, |first| *first);
         assert_eq!(refused, (from..SCANS).collect::<Vec<_>>(), "{by}");
         assert_eq!(from < SCANS, is_refused, "{by}: {from}");

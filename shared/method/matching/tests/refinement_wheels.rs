@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::common::scenes::*;
-use gyre_geometry::{SparsePoint, pose};
-use gyre_matching::{Aiding, Outcome, Refined, Refiner, Verdict};
+use gyre_geometry::{SparsePoint, pose, samples::Witness};
+use gyre_matching::{Outcome, Refined, Refiner, Verdict};
 
 const SCANS: usize = 100;
 /// Six seconds.
@@ -31,17 +31,20 @@ fn refine_with(
     measured: impl Fn(usize) -> Option<f64>,
     turns: bool,
 ) -> Vec<Refined> {
-    let aiding = |k: usize| Aiding {
-        turn: turns.then(|| by_gyro(drive, BIAS_RADPS)),
-        distance: measured(k).map(|factor| by_wheels(drive, k, factor)),
-        ..Aiding::default()
+    let evidence = |k: usize| {
+        let distance = measured(k).map(|factor| by_wheels(drive, k, factor));
+        let mut all = evidence_of(Witness::Wheels, distance);
+        if turns {
+            all[Witness::Gyro as usize] = by_gyro(drive, BIAS_RADPS);
+        }
+        all
     };
     // The search finds nothing where there is nothing.
     let search = |k: usize| match BLIND.contains(&k) || BLIND.contains(&(k - 1)) {
         true => pose(-3.0, 4.0, 0.5),
         false => drive.pose(k - 1).inv_mul(&drive.pose(k)),
     };
-    refine_aided(refiner, scans, aiding, search)
+    refine_aided(refiner, scans, evidence, search)
 }
 
 #[test]
@@ -72,7 +75,7 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
         // No jump where the radar sees again.
         let (seen, _) = off(&drive, &both, BLIND.end..BLIND.end + 3);
         assert!(seen.translation.vector.norm() < 0.15, "{fault}: {seen}");
-        let scale = both[SCANS - 2].wheels.unwrap();
+        let scale = both[SCANS - 2].witnesses[Witness::Wheels as usize].unwrap();
         let apart = scale.scale - 1.0 / SCALE;
         assert!(
             apart.abs() < 3.0 * scale.scale_sigma && scale.scale_sigma < 3e-3,
@@ -89,9 +92,7 @@ fn wheels_that_slip_change_no_motion_while_the_radar_sees() {
     let (drive, scans) = faster();
     let slip = |k: usize| Some(if (40..46).contains(&k) { 1.5 } else { 1.0 });
     let slipping = refine_with(&mut refiner(), (&drive, &scans), slip, true);
-    let slips = scans_where(&slipping, |it| {
-        it.wheels.is_some_and(|it| it.verdict == Verdict::Refused)
-    });
+    let slips = judged(&slipping, Witness::Wheels, Verdict::Refused);
     assert_eq!(slips, (40..46).collect::<Vec<_>>());
     let (whole, _) = off(&drive, &slipping, 0..SCANS - 1);
     assert!(whole.translation.vector.norm() < 0.5, "{whole}");

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use crate::common::scenes::{point, posts};
-use gyre_geometry::{Pose, SparsePoint};
-use gyre_matching::{Outcome, Refined, RefinementConfig, Refiner};
+use gyre_geometry::{Pose, SparsePoint, samples::SensorConfigs};
+use gyre_matching::{Outcome, Refined, RefinementConfig, Refiner, Searched};
 use nalgebra::{Point2, Rotation2, Vector2};
 
 const SWEEP_S: f64 = 1.0;
@@ -63,7 +63,7 @@ fn refined(seed: u64) -> Vec<Refined> {
         reach_m: 80.0,
         ..RefinementConfig::default()
     };
-    let mut refiner = Refiner::new(&config, 2048).unwrap();
+    let mut refiner = Refiner::new(&config, &SensorConfigs::default(), 2048).unwrap();
     let posts: Vec<_> = posts([[-80.0, 130.0], [-120.0, 80.0]], 60.0, seed)
         .iter()
         .map(|p| p.from.into())
@@ -72,7 +72,13 @@ fn refined(seed: u64) -> Vec<Refined> {
     let [x, y, turn] = SEARCH_OFF;
     let next = |k: usize| {
         let searched = true_motion(k) * Pose::new(Vector2::new(x, y), turn);
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+        refiner.refine(&Searched::by_radar(
+            k as u64,
+            &scans[k],
+            &scans[k - 1],
+            &searched,
+            SWEEP_S,
+        ))
     };
     (1..SCANS).map(next).collect()
 }

@@ -1,8 +1,8 @@
 //! A tunnel, whose walls look the same everywhere: displacement along it is unobservable.
 
 use crate::common::{Numbers, scenes::*};
-use gyre_geometry::{Pose, SparsePoint, pose};
-use gyre_matching::{Aiding, InitialGuess, Outcome, Refined, Refiner};
+use gyre_geometry::{Pose, SparsePoint, pose, samples::Witness};
+use gyre_matching::{InitialGuess, Outcome, Refined, Refiner};
 
 const SCANS: usize = 100;
 /// The last houses are out of sight.
@@ -25,11 +25,9 @@ fn refine_searched(
     wheels: impl Fn(usize) -> Option<f64>,
     search: impl FnMut(usize) -> Pose,
 ) -> Vec<Refined> {
-    let aiding = |k: usize| Aiding {
-        distance: wheels(k).map(|factor| by_wheels(drive, k, factor)),
-        ..Aiding::default()
-    };
-    refine_aided(refiner, scans, aiding, search)
+    let distance = |k: usize| wheels(k).map(|factor| by_wheels(drive, k, factor));
+    let evidence = |k: usize| evidence_of(Witness::Wheels, distance(k));
+    refine_aided(refiner, scans, evidence, search)
 }
 
 fn inside(drive: &Drive, refined: &[Refined]) -> (Pose, f64) {

@@ -16,7 +16,7 @@ use std::f32::consts::TAU;
 
 use fit::Fit;
 use gyre_geometry::{
-    samples::DopplerVelocity,
+    samples::Evidence,
     scan::{PolarScan, ScanError, flag},
 };
 use rows::Rows;
@@ -114,7 +114,7 @@ impl DopplerEstimator {
         &mut self,
         scan: &PolarScan<'_>,
         min_range_m: f32,
-    ) -> Result<DopplerVelocity, NoDoppler> {
+    ) -> Result<Evidence, NoDoppler> {
         check_chirps(scan)?;
         self.rows.update(scan, min_range_m);
         self.shifts.update(scan, &self.rows);

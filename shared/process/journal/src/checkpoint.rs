@@ -25,7 +25,7 @@ use slot::{
 };
 
 /// The start of the file, with the version of the slots.
-const MAGIC: [u8; 16] = *b"gyre map v12    ";
+const MAGIC: [u8; 16] = *b"gyre map v13    ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be
 /// continued with a different window.
 const MAX_WINDOW: usize = 66;

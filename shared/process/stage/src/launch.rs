@@ -9,6 +9,7 @@ use gyre_contract::{
     FollowerId, Message,
     run::{RunConfig, StageConfig, StageCounters},
 };
+use gyre_geometry::samples::{SensorConfigs, Witness};
 use gyre_transport::{
     Manifest, RunError,
     heartbeat::HeartbeatWriter,
@@ -158,17 +159,29 @@ impl Launch {
     pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, RunError> {
         let table = self.configuration.get(section).cloned();
         let table = table.unwrap_or_else(|| toml::Table::new().into());
-        table.try_into().map_err(|error: toml::de::Error| {
-            RunError::Input(format!(
-                "[{section}] in the configuration: {}",
-                error.message()
-            ))
-        })
+        read(section, table)
+    }
+
+    /// Returns the sections of the sensors beside the radar.
+    pub fn sensors(&self) -> Result<SensorConfigs, RunError> {
+        read(
+            &Witness::ALL.map(Witness::name).join("] or ["),
+            self.configuration.clone().into(),
+        )
     }
 
     pub fn has_section(&self, section: &str) -> bool {
         self.configuration.contains_key(section)
     }
+}
+
+fn read<T: DeserializeOwned>(section: &str, table: toml::Value) -> Result<T, RunError> {
+    table.try_into().map_err(|error: toml::de::Error| {
+        RunError::Input(format!(
+            "[{section}] in the configuration: {}",
+            error.message()
+        ))
+    })
 }
 
 fn stands_by() -> bool {

@@ -121,7 +121,7 @@ mod tests {
     use std::time::Duration;
 
     use gyre_configuration::Configuration;
-    use gyre_contract::run::latency::Latency;
+    use gyre_contract::{Witness, run::latency::Latency};
 
     use super::*;
     use crate::summary::{
@@ -234,7 +234,11 @@ look at     gyre report out/radiate --open; all figures:
             let counts = Counts {
                 processed: 466,
                 motions: Some(motions),
-                sensors: SensorCounts([gyro, Some(wheels), None]),
+                sensors: SensorCounts(Witness::ALL.map(|kind| match kind {
+                    Witness::Gyro => gyro,
+                    Witness::Wheels => Some(wheels),
+                    _ => None,
+                })),
                 ..Counts::default()
             };
             let summary = summary("max", counts, 1e6);

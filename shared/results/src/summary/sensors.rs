@@ -80,6 +80,11 @@ impl Serialize for Named<'_> {
                 map.serialize_entry("scale", &last.scale)?;
                 map.serialize_entry("scale_sigma", &last.scale_sigma)?;
             }
+            Measures::Heading => {
+                map.serialize_entry(refused, &count.refused)?;
+                map.serialize_entry("offset_rad", &last.bias)?;
+                map.serialize_entry("offset_sigma_rad", &last.bias_sigma)?;
+            }
         }
         if row.samples.is_some() {
             map.serialize_entry("delay_s", &count.delay_s)?;
@@ -102,6 +107,8 @@ impl SensorCounter {
                 // A registered turn depends on the gyro.
                 Measures::Turn => motion.searched[2],
                 Measures::Distance => motion.x_m,
+                // A heading, whose offset is unknown, is no motion.
+                Measures::Heading => continue,
             };
             self.clocks[kind as usize].add(pose, by_radar, record.of(kind).measured());
         }
@@ -171,16 +178,11 @@ pub fn problem(
     counts: &Counts,
     gnss: Option<&GnssSummary>,
 ) -> Option<String> {
-    let config = &configuration.odometry;
+    let sensors = &configuration.odometry.sensors;
     // Without a refinement it is not known what gyro and wheels were used for.
     let motions = counts.processed.saturating_sub(1 + counts.breaks);
     let motions = counts.motions.map_or(0, |_| motions);
-    let settings = |kind| match kind {
-        Witness::Gyro => (config.gyro.is_used(), config.gyro.delay_s),
-        Witness::Wheels => (config.wheels.is_used(), config.wheels.delay_s),
-        Witness::Doppler => (config.doppler.is_used(), 0.0),
-    };
-    let is_unused = |kind: &Witness| settings(*kind).0 && counts.sensors.of(*kind).is_none();
+    let is_unused = |kind: &Witness| sensors.is_used(*kind) && counts.sensors.of(*kind).is_none();
     let sampled = || Witness::sampled().map(|(kind, _)| kind);
     if let Some(section) = sampled().find(is_unused).map(Witness::name)
         && motions > 0
@@ -195,16 +197,20 @@ pub fn problem(
         let is_wrong = match kind.row().measures {
             Measures::Turn => {
                 too_many(contradictions, it.motions, MAX_DOUBTED_SHARE)
-                    || !config.gyro.allows_scale(it.last.scale)
+                    || (it.last.scale - 1.0).abs() > sensors.gyro.max_scale_error()
             }
             Measures::Distance => too_many(contradictions, it.motions, MAX_SLIPPING_SHARE),
+            Measures::Heading => too_many(contradictions, it.motions, MAX_DOUBTED_SHARE),
         };
         let section = kind.name();
-        let cause = cause(kind, settings(kind).1, it.delay_s, is_wrong)?;
+        let cause = cause(kind, sensors.of(kind)?.delay_s(), it.delay_s, is_wrong)?;
         let motions = it.motions;
         Some(match kind.row().measures {
             Measures::Turn => format!(
                 "the {section} contradicts the radar: {contradictions} of its {motions} turns were doubted or refused; {cause}, and {section}.kind=none leaves it out"
+            ),
+            Measures::Heading => format!(
+                "the {section} contradicts the radar: {contradictions} of its {motions} headings were refused; {cause}, and {section}.kind=none leaves it out"
             ),
             Measures::Distance => format!(
                 "the {section} contradict the radar: {contradictions} of their {motions} distances are not those that it sees; {cause}, and {section}.kind=none leaves them out"
@@ -223,12 +229,15 @@ fn cause(kind: Witness, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) 
     let section = kind.name();
     let up = match kind.row().measures {
         Measures::Turn => "`gyro.up`, ",
-        Measures::Distance => "",
+        Measures::Distance | Measures::Heading => "",
     };
     match measured {
         Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
             set_s + delay_s
+        )),
+        _ if is_wrong && kind.row().measures == Measures::Heading => Some(format!(
+            "it turns the other way, is of another drive, or `{section}.delay_s` or `{section}.noise_deg` is wrong"
         )),
         _ => is_wrong.then(|| {
             format!(

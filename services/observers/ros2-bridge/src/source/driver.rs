@@ -69,6 +69,17 @@ impl PacketMessage {
 type TakePacket = Box<dyn Fn() -> Result<Option<Packet>, ReadError>>;
 /// Takes the next sample of a topic.
 type TakeSample = Box<dyn Fn() -> Option<Sample>>;
+type SubscribeSamples = fn(&mut Node, &mut Wakeups, &str) -> Result<TakeSample, RunError>;
+
+/// The kinds whose samples travel with the scans, and their messages.
+const SAMPLED: [(SampleKind, SubscribeSamples); 2] = [
+    (SampleKind::Gyro, |node, wakeups, topic| {
+        samples(node, wakeups, topic, Imu::sample)
+    }),
+    (SampleKind::Wheels, |node, wakeups, topic| {
+        samples(node, wakeups, topic, Odometry::sample)
+    }),
+];
 
 pub struct Driver {
     node: Node,
@@ -93,22 +104,15 @@ impl Driver {
         let mut sample_wakeups = Wakeups::new()?;
         let (mut samples, mut fixes) = (Vec::new(), None);
         for (kind, topic) in &settings.sensors {
-            let of_kind = match kind {
-                SampleKind::Gyro => {
-                    let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
-                    taken(*kind, topic, Imu::sample)
-                }
-                SampleKind::Wheels => {
-                    let topic = sample_wakeups.subscribe(&mut node, topic, SAMPLES, true)?;
-                    taken(*kind, topic, Odometry::sample)
-                }
-                SampleKind::Gnss => {
-                    let to = &settings.fixes_to;
-                    fixes = Some(Fixes::open(&mut node, &mut wakeups, topic, to)?);
-                    continue;
-                }
-            };
-            samples.push(of_kind);
+            if *kind == SampleKind::Gnss {
+                let to = &settings.fixes_to;
+                fixes = Some(Fixes::open(&mut node, &mut wakeups, topic, to)?);
+            }
+            let sampled = SAMPLED.iter().find(|(of, _)| of == kind);
+            if let Some((_, subscribe)) = sampled {
+                let take = subscribe(&mut node, &mut sample_wakeups, topic)?;
+                samples.push((*kind, take));
+            }
         }
         Ok(Self {
             topic: settings.topic.clone(),
@@ -191,16 +195,21 @@ impl Driver {
 
 /// The sample of an unreadable message, or one without rates, is not a number, so that it is
 /// counted.
-fn taken<M: Ros2Message + Send + 'static>(
-    kind: SampleKind,
-    topic: Subscription<M>,
+fn samples<M: Ros2Message + Send + 'static>(
+    node: &mut Node,
+    wakeups: &mut Wakeups,
+    topic: &str,
     sample: fn(&M, i64) -> Sample,
-) -> (SampleKind, TakeSample) {
+) -> Result<TakeSample, RunError> {
+    let topic: Subscription<M> = wakeups.subscribe(node, topic, SAMPLES, true)?;
     let take = move || match topic.take() {
         Ok(taken) => taken.map(|(message, _)| sample(&message, clock::since_1970_ns())),
-        Err(_) => Some(Sample::of(kind, 0, [f64::NAN; 6])),
+        Err(_) => Some(Sample {
+            values: [f64::NAN; 6],
+            ..Sample::default()
+        }),
     };
-    (kind, Box::new(take))
+    Ok(Box::new(take))
 }
 
 fn packets<M: Ros2Message + Send + 'static>(

@@ -21,11 +21,10 @@ pub(super) fn examine(
     logs: &InspectedLogs,
     timing: Option<&Timing>,
 ) {
-    let kinds = [SampleKind::Gyro, SampleKind::Wheels, SampleKind::Gnss];
-    for of in kinds {
+    for of in SampleKind::ALL {
         report.figure(of.section(), Value::Null);
     }
-    for of in kinds {
+    for of in SampleKind::ALL {
         let kind = Kind::of(of);
         let Some((file, log)) = log(report, dataset, kind, logs) else {
             continue;
@@ -82,16 +81,13 @@ fn content(
 ) {
     let (of, section) = (kind.of, kind.of.section());
     let times = Times::of(log.samples.iter().map(|it| it.stamp_ns), timing);
+    let contents = CONTENTS.iter().find(|(kind, _)| *kind == of);
     let Content {
         what,
         quiet,
         finding,
         mut figures,
-    } = match of {
-        SampleKind::Gyro => turns(log, times.period_s),
-        SampleKind::Wheels => path(log),
-        SampleKind::Gnss => places(log),
-    };
+    } = contents.map_or_else(Content::default, |(_, of)| of(log, times.period_s));
     let name = log.topic.clone().unwrap_or_else(|| report.name_of(file));
     times.lines(report, section, &format!("{name}: {what}"), kind.samples);
     if let Some(quiet) = quiet {
@@ -117,6 +113,15 @@ fn content(
     report.figure(section, times.figures(file, figures));
 }
 
+/// What the logs of a kind contain, by the period of their samples, s; that of other kinds is their
+/// times alone.
+const CONTENTS: [(SampleKind, fn(&SampleLog, f64) -> Content); 3] = [
+    (SampleKind::Gyro, turns),
+    (SampleKind::Wheels, |log, _| path(log)),
+    (SampleKind::Gnss, |log, _| places(log)),
+];
+
+#[derive(Default)]
 struct Content {
     what: String,
     quiet: Option<String>,

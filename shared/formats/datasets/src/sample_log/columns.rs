@@ -42,10 +42,8 @@ pub(crate) enum Read {
     NumberIfAny(f64),
     /// A number with the sign in this column.
     Signed(usize, &'static Sign),
-    /// A field is blank if the sensor does not know the value.
-    NumberOrBlank,
-    /// The square of such a number, with its sign.
-    Square,
+    /// What this makes of a number; a field is blank if the sensor does not know the value.
+    OrBlank(fn(f64) -> f64),
     /// 1 for this text, 0 for any other.
     Is(&'static str),
 }
@@ -106,8 +104,7 @@ impl Field {
             Read::Number(factor) => Some(number? * factor),
             Read::NumberIfAny(factor) => Some(number.unwrap_or(f64::NAN) * factor),
             Read::Signed(column, sign) => sign.apply(number?, row.get(column)?),
-            Read::NumberOrBlank => known(),
-            Read::Square => known().map(|value| value * value.abs()),
+            Read::OrBlank(of) => known().map(of),
             Read::Is(known) => Some(f64::from(text == known)),
         }
     }

@@ -41,13 +41,14 @@ impl Jumps {
 /// Leaves out samples of a kind, in the order of their stamps, that jump away from those before and
 /// back to those after them.
 pub(crate) fn leave_out(samples: &mut Vec<Sample>, of: SampleKind) -> Jumps {
-    let Some((value, per_s)) = Kind::of(of).changes else {
+    let Some((changed, per_s)) = Kind::of(of).changes else {
         return Jumps::default();
     };
     let all: &[Sample] = samples;
-    let at_least = at_least(all, per_s, value);
+    let change = |from: usize, to: usize| changed(&all[from], &all[to]);
+    let at_least = at_least(all, per_s, change);
     let step = |from: usize, to: usize| {
-        let change = all[to].values[value] - all[from].values[value];
+        let change = change(from, to);
         let most = at_least.max(per_s * seconds(all, from, to));
         (change.abs() > most).then_some(change)
     };
@@ -79,11 +80,10 @@ pub(crate) fn leave_out(samples: &mut Vec<Sample>, of: SampleKind) -> Jumps {
 
 /// The change of a value that is no jump, whatever the time between two samples, which are closer
 /// together where stamps jitter.
-fn at_least(samples: &[Sample], per_s: f64, value: usize) -> f64 {
+fn at_least(samples: &[Sample], per_s: f64, change: impl Fn(usize, usize) -> f64) -> f64 {
     let pairs = || 1..samples.len();
     let period_s = median(pairs().map(|k| seconds(samples, k - 1, k))).unwrap_or_default();
-    let change = |k: usize| (samples[k].values[value] - samples[k - 1].values[value]).abs();
-    let mut changes: Vec<f64> = pairs().map(change).collect();
+    let mut changes: Vec<f64> = pairs().map(|k| change(k - 1, k).abs()).collect();
     changes.sort_unstable_by(f64::total_cmp);
     let usual = changes.get((USUAL_SHARE * changes.len() as f64) as usize);
     (per_s * period_s).max(UNUSUAL * usual.copied().unwrap_or_default())

@@ -45,8 +45,9 @@ pub(crate) struct Kind {
     pub value_words: &'static str,
     pub absurd: &'static str,
     pub unit: &'static str,
-    /// The value that cannot change faster than a vehicle, and by how much it can in a second.
-    pub changes: Option<(usize, f64)>,
+    /// The change from one sample to another that cannot be faster than a vehicle, and by how much
+    /// it can be in a second.
+    pub changes: Option<(fn(&Sample, &Sample) -> f64, f64)>,
 }
 
 impl Kind {
@@ -102,7 +103,7 @@ const GYRO: Kind = Kind {
     // The largest yaw acceleration of a vehicle, rad/s²: tyres that hold as much as they carry turn
     // one with the wheelbase L, whose mass is spread over it, by 2 g / L. No vehicle with a radar
     // is shorter than half a metre.
-    changes: Some((2, 40.0)),
+    changes: Some((|from, to| to.values[2] - from.values[2], 40.0)),
 };
 
 pub(super) const WHEELS: Kind = Kind {
@@ -128,7 +129,7 @@ pub(super) const WHEELS: Kind = Kind {
     absurd: "speeds beyond 100 m/s, at which no vehicle drives",
     unit: "of the speed: m/s is assumed; `gyre calibrate` tells km/h by its scale",
     // m/s²: twice as much as tyres brake that hold as much as they carry.
-    changes: Some((0, 20.0)),
+    changes: Some((|from, to| to.values[0] - from.values[0], 20.0)),
     ..GYRO
 };
 

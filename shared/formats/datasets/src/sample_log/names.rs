@@ -7,7 +7,7 @@ use gyre_geometry::samples::{Sample, SampleKind};
 use super::columns::{Columns, Counts, Read};
 use crate::header::{Header, Sign, Stamp, endings, unit_of};
 
-fn missing(header: &Header, what: &str, hint: &str) -> String {
+pub(super) fn missing(header: &Header, what: &str, hint: &str) -> String {
     format!("its columns {} have no {what}: {hint}", header.listed())
 }
 
@@ -215,9 +215,13 @@ pub(super) fn positions(header: &Header) -> Result<Columns, String> {
     let mut columns = Columns::of(stamp)
         .with(0, [a], sign(&NORTH_OR_SOUTH))
         .with(1, [b], sign(&EAST_OR_WEST))
-        .with(2, header.find(ALTITUDE), Read::NumberOrBlank)
+        .with(2, header.find(ALTITUDE), Read::OrBlank(|it| it))
         // A negative deviation has a negative square.
-        .with(3, sigma.into_iter().flatten(), Read::Square)
+        .with(
+            3,
+            sigma.into_iter().flatten(),
+            Read::OrBlank(|it| it * it.abs()),
+        )
         .with(5, header.find(STATUS), Read::Is(STATUS_UNKNOWN));
     columns.form.is_plane = on_earth.is_none();
     Ok(columns)
@@ -229,7 +233,7 @@ pub(super) fn unnamed_positions(columns: usize) -> Result<Columns, String> {
     match columns {
         13 => Ok(Columns::of(Stamp::first(false))
             .with(0, [1, 2], Read::Number(1.0))
-            .with(2, [3, 4, 8], Read::NumberOrBlank)),
+            .with(2, [3, 4, 8], Read::OrBlank(|it| it))),
         _ => unnamed(columns, 13, "MulRan's gps.csv", POSITIONS_REMEDY),
     }
 }

@@ -21,7 +21,7 @@ use crate::bags::{
 /// Reads a message; `None` of one that states that nothing was measured.
 type Decode = fn(&Message) -> Result<Option<Sample>, String>;
 
-/// A sensor, and how its messages become samples.
+/// A kind of sensor that ROS 2 has messages of, and how these become samples.
 struct Sensor {
     of: SampleKind,
     /// The measurements in words, such as `samples of the gyro`.
@@ -31,39 +31,39 @@ struct Sensor {
     to_be_named: Option<&'static str>,
 }
 
-const GYRO: Sensor = Sensor {
-    of: SampleKind::Gyro,
-    measurements: "samples of the gyro",
-    types: &[("sensor_msgs/msg/Imu", |it| {
-        Ok(Some(of::<Imu>(it)?.sample(it.log_ns)))
-    })],
-    to_be_named: None,
-};
-
-const WHEELS: Sensor = Sensor {
-    of: SampleKind::Wheels,
-    measurements: "samples of the wheels",
-    types: &[
-        ("nav_msgs/msg/Odometry", |it| {
-            Ok(Some(of::<Odometry>(it)?.sample(it.log_ns)))
-        }),
-        ("geometry_msgs/msg/TwistStamped", |it| {
-            Ok(Some(of::<TwistStamped>(it)?.sample(it.log_ns)))
-        }),
-    ],
-    to_be_named: Some(
-        "name the topic that is of wheels with wheels.topic, since odometry may be of anything, as the radar's own in a bag that Gyre has exported",
-    ),
-};
-
-const GNSS: Sensor = Sensor {
-    of: SampleKind::Gnss,
-    measurements: "fixes of a GNSS receiver",
-    types: &[("sensor_msgs/msg/NavSatFix", |it| {
-        Ok(of::<NavSatFix>(it)?.fix(it.log_ns))
-    })],
-    to_be_named: None,
-};
+const SENSORS: [Sensor; 3] = [
+    Sensor {
+        of: SampleKind::Gyro,
+        measurements: "samples of the gyro",
+        types: &[("sensor_msgs/msg/Imu", |it| {
+            Ok(Some(of::<Imu>(it)?.sample(it.log_ns)))
+        })],
+        to_be_named: None,
+    },
+    Sensor {
+        of: SampleKind::Wheels,
+        measurements: "samples of the wheels",
+        types: &[
+            ("nav_msgs/msg/Odometry", |it| {
+                Ok(Some(of::<Odometry>(it)?.sample(it.log_ns)))
+            }),
+            ("geometry_msgs/msg/TwistStamped", |it| {
+                Ok(Some(of::<TwistStamped>(it)?.sample(it.log_ns)))
+            }),
+        ],
+        to_be_named: Some(
+            "name the topic that is of wheels with wheels.topic, since odometry may be of anything, as the radar's own in a bag that Gyre has exported",
+        ),
+    },
+    Sensor {
+        of: SampleKind::Gnss,
+        measurements: "fixes of a GNSS receiver",
+        types: &[("sensor_msgs/msg/NavSatFix", |it| {
+            Ok(of::<NavSatFix>(it)?.fix(it.log_ns))
+        })],
+        to_be_named: None,
+    },
+];
 
 /// Reads the samples of a sensor in a bag without its scans, on the topic of this name, else on the
 /// only topic of such messages. `None` without such a topic.
@@ -85,10 +85,8 @@ pub(crate) fn samples(
     of: SampleKind,
     wished: Option<&str>,
 ) -> Result<Option<Logged>, RecordingError> {
-    let sensor = match of {
-        SampleKind::Gyro => GYRO,
-        SampleKind::Wheels => WHEELS,
-        SampleKind::Gnss => GNSS,
+    let Some(sensor) = SENSORS.iter().find(|sensor| sensor.of == of) else {
+        return Ok(None);
     };
     let refuse = |reason: String| Err(RecordingError::unreadable(path, reason));
     let (topic, decode) = match sensor.choose(bag, wished) {

@@ -1,6 +1,6 @@
 use std::{f64::consts::TAU, path::Path};
 
-use gyre_geometry::samples::{GyroConfig, SampleKind, UpAxis, WheelsConfig};
+use gyre_geometry::samples::{GyroConfig, SampleKind, SensorConfig as _, UpAxis, WheelsConfig};
 use proptest::prelude::*;
 
 use super::{

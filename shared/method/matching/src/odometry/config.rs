@@ -1,5 +1,5 @@
 use crate::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
-use gyre_geometry::samples::{DopplerConfig, GyroConfig, SensorConfig, WheelsConfig};
+use gyre_geometry::samples::SensorConfigs;
 use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
 use schemars::JsonSchema;
@@ -26,22 +26,15 @@ pub struct OdometryConfig {
     pub exhaustive: ExhaustiveConfig,
     /// The refinement of searched motions.
     pub refinement: RefinementConfig,
-    /// The gyro, if there is one.
-    pub gyro: GyroConfig,
-    /// The wheels, if their speed is known.
-    pub wheels: WheelsConfig,
-    /// The velocity by the Doppler shift of single scans.
-    pub doppler: DopplerConfig,
+    /// The sensors beside the radar.
+    #[serde(flatten)]
+    pub sensors: SensorConfigs,
 }
 
 impl OdometryConfig {
-    /// The sensors whose samples come with the scans.
-    pub fn sensors(&self) -> [&dyn SensorConfig; 2] {
-        [&self.gyro, &self.wheels]
-    }
-
     pub fn has_samples(&self) -> bool {
-        self.sensors().iter().any(|sensor| sensor.kind().is_used())
+        let sampled = self.sensors.sampled();
+        sampled.iter().any(|sensor| sensor.kind().is_used())
     }
 }
 

@@ -1,11 +1,11 @@
 use gyre_geometry::{
     PolarScan, SparsePoint, Twist, continues,
-    samples::{DopplerVelocity, GyroTurn, WheelDistance},
+    samples::{AllEvidence, Witness},
 };
 use gyre_masking::{Masker, Sweep};
 use ndarray::{Array2, ArrayView2};
 
-use crate::{Aiding, odometry::OdometryError};
+use crate::odometry::OdometryError;
 
 /// Two consecutive scans: their masked rasters (n x n, row 0 far ahead) and their points.
 pub struct Pair {
@@ -14,8 +14,6 @@ pub struct Pair {
     /// The raster of the earlier scan, masked for this pair, if the mask takes two scans.
     pub(crate) earlier_for_pair: Option<Array2<f32>>,
     pub(crate) seq: u64,
-    pub(crate) turn: Option<GyroTurn>,
-    pub(crate) distance: Option<WheelDistance>,
 }
 
 pub(crate) struct Frame {
@@ -23,7 +21,8 @@ pub(crate) struct Frame {
     pub twist: Option<Twist>,
     /// Variance of the mean azimuth of the rows: not zero if azimuths were lost at unknown places.
     pub azimuth_variance_rad2: f32,
-    pub velocity: Option<DopplerVelocity>,
+    /// About the motion to this scan, by other sensors than the radar.
+    pub evidence: AllEvidence,
     pub raster: Array2<f32>,
     points: Vec<SparsePoint>,
     count: usize,
@@ -76,14 +75,10 @@ impl Pair {
         later.saturating_sub(earlier)
     }
 
-    pub(crate) fn aiding(&self) -> Aiding {
-        let [earlier, later] = [&self.earlier, &self.later];
-        Aiding {
-            azimuth_variance_rad2: earlier.azimuth_variance_rad2 + later.azimuth_variance_rad2,
-            turn: self.turn,
-            distance: self.distance,
-            velocities: [earlier.velocity, later.velocity],
-        }
+    /// Returns the turn between both scans by a gyro, rad; `None` if it was not measured.
+    pub fn turn_rad(&self) -> Option<f64> {
+        let turn = self.later.evidence[Witness::Gyro as usize].measured();
+        turn.map(|turn| turn.value[0])
     }
 
     pub(crate) fn new(n: usize, capacity: usize, masked_scans: usize) -> Self {
@@ -92,8 +87,6 @@ impl Pair {
             earlier: Frame::new(n, capacity),
             earlier_for_pair: (masked_scans == 2).then(|| Array2::zeros((n, n))),
             seq: 0,
-            turn: None,
-            distance: None,
         }
     }
 
@@ -135,14 +128,14 @@ impl Frame {
             stamp_ns: 0,
             twist: None,
             azimuth_variance_rad2: 0.0,
-            velocity: None,
+            evidence: AllEvidence::default(),
             raster: Array2::zeros((n, n)),
             points: vec![SparsePoint::default(); capacity],
             count: 0,
         }
     }
 
-    fn points(&self) -> &[SparsePoint] {
+    pub fn points(&self) -> &[SparsePoint] {
         &self.points[..self.count]
     }
 }

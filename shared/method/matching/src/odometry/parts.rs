@@ -44,9 +44,8 @@ fn refiner(config: &OdometryConfig) -> Result<Option<Refiner>, SetupError> {
         RefinementKind::None => Ok(None),
         RefinementKind::LocalMap if capacity == 0 => Err(SetupError::NoPoints),
         RefinementKind::LocalMap => {
-            let refiner = Refiner::new(&config.refinement, capacity)?;
-            let (gyro, wheels, doppler) = (&config.gyro, &config.wheels, &config.doppler);
-            Ok(Some(refiner.with_sensors(gyro, wheels, doppler)))
+            let (config, sensors) = (&config.refinement, &config.sensors);
+            Ok(Some(Refiner::new(config, sensors, capacity)?))
         }
     }
 }

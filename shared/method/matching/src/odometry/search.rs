@@ -36,7 +36,7 @@ impl Search for DecoupledSearch {
     fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError> {
         let (later, earlier) = (pair.later(), pair.earlier());
         let changed = pair.earlier_changed();
-        let turn = pair.turn.map(|turn| turn.yaw_rad);
+        let turn = pair.turn_rad();
         let rotation = self
             .rotation
             .next(pair.seq(), later, earlier, changed, turn)?; // Eq. 7

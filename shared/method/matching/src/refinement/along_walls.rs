@@ -12,7 +12,7 @@ use nalgebra::{UnitVector2, Vector2};
 use super::{
     InitialGuess, Refiner,
     alignment::Alignment,
-    registration::{Candidate, Scan},
+    candidates::{Candidate, Scan},
     structure::WeakestDirection,
     uncertainty::{self, Uncertainty},
 };
@@ -45,7 +45,7 @@ impl Refiner {
         best: &mut Candidate,
         uncertainty: &Uncertainty,
     ) -> Option<Match> {
-        let registered = self.registered(&best.alignment)?;
+        let registered = self.registered(scan, &best.alignment)?;
         let along = self.undetermined(scan, &best.alignment, &registered);
         let Some(along) = along.filter(|_| best.fits) else {
             return best.is_plausible.then_some(Match::of(registered, None));
@@ -77,11 +77,11 @@ impl Refiner {
         };
         let mut initial = best.alignment.pose;
         initial.translation.vector += ahead_to(place, &initial);
-        let across = self.registration(scan).align_across(guess, &initial, along);
+        let across = self.candidates(scan).align_across(guess, &initial, along);
         if !across.is_plausible {
             return None;
         }
-        let registered = self.registered(&across.alignment)?;
+        let registered = self.registered(scan, &across.alignment)?;
         *best = across;
         let mut found = Match::of(registered, Some(along));
         if is_guessed && !is_searched {
@@ -112,7 +112,7 @@ impl Refiner {
         if self.state.sliding == 0 {
             return false;
         }
-        self.registration(scan).deskew(place);
+        self.candidates(scan).registration().deskew(place);
         WeakestDirection::by_search(&self.map, &self.points, place, self.state.ahead_m)
             .is_some_and(|weakest| !weakest.is_doubtful())
     }
@@ -190,7 +190,7 @@ impl Refiner {
         self.placed(registered, along, variance, self.drift_share())
     }
 
-    fn drift_share(&self) -> f64 {
+    pub(super) fn drift_share(&self) -> f64 {
         uncertainty::drift_share(self.map.len(), &self.config)
     }
 
@@ -220,8 +220,6 @@ impl Refiner {
             Some(_) => 0,
             None => self.state.sliding.saturating_add(1),
         };
-        self.each_distance(registered, |state, measured, driven, _| {
-            state.propagate_along_walls(measured, driven);
-        });
+        self.follow_distances(scan, registered);
     }
 }

@@ -1,15 +1,19 @@
 //! The state kept from scan to scan: the last poses, the predictions from them, and how well scans
 //! match on average.
 
-use gyre_geometry::{Pose, Twist};
-use nalgebra::{UnitComplex, Vector2};
+use gyre_geometry::{
+    Pose, Twist,
+    samples::{Measures, Witness},
+};
+use nalgebra::{Matrix3, UnitComplex, Vector2};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Heading, Outcome, RefinementConfig, Standstill, WheelState,
+    Filter, Outcome, RefinementConfig, SinceMatch, Standstill,
     config::{JITTER_DEG, JITTER_M},
-    heading::PredictedTurn,
-    wheels::PredictedDistance,
+    filter::Predicted,
+    predicted::{PredictedDistance, PredictedTurn},
+    sensors::Measured,
 };
 
 /// Weight of the newest velocity, which jitters with each match, in its running mean.
@@ -35,13 +39,10 @@ pub struct TrackerState {
     /// Displacement by the search beyond such guesses, m, along the axes of the map.
     pub ahead_m: Vector2<f64>,
     pub standstill: Standstill,
-    /// The bias of the gyro, and the like; `None` until it has measured a turn.
-    pub heading: Option<Heading>,
-    /// The scale of the wheels, and the like; `None` until they have measured a distance.
-    pub wheels: Option<WheelState>,
-    /// The scale of the velocity by Doppler, and the like; `None` until two scans in a row have
-    /// determined it.
-    pub doppler: Option<WheelState>,
+    /// The bias and the scale of each sensor, and the like, in the order of [`Witness::ALL`]; `None`
+    /// until it has measured something.
+    pub filters: [Option<Filter>; Witness::ALL.len()],
+    pub since_match: SinceMatch,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -50,6 +51,8 @@ pub(super) struct Step {
     pub turn: Option<PredictedTurn>,
     /// The distance since then, by wheels that do not slip, or by Doppler.
     pub distance: Option<PredictedDistance>,
+    pub measured: Measured,
+    pub predicted: [Option<Predicted>; Witness::ALL.len()],
 }
 
 impl Step {
@@ -112,6 +115,18 @@ impl Anchor {
 }
 
 impl TrackerState {
+    /// The filter of the heading, if a gyro has measured a turn.
+    pub(super) fn heading_mut(&mut self) -> Option<&mut Filter> {
+        self.filters[Witness::Gyro as usize].as_mut()
+    }
+
+    /// Returns whether a sensor has measured a distance.
+    pub(super) fn has_distance(&self) -> bool {
+        let kinds = Witness::ALL.into_iter().zip(&self.filters);
+        let mut distances = kinds.filter(|(kind, _)| kind.row().measures == Measures::Distance);
+        distances.any(|(_, filter)| filter.is_some())
+    }
+
     /// The poses after the interval at constant velocity, predicted from each anchor; the last pose
     /// without an anchor. With wheels or Doppler, the distance from the last pose to the first is
     /// the measured one.
@@ -134,7 +149,7 @@ impl TrackerState {
 
     fn heading_at(&self, step: &Step) -> Option<UnitComplex<f64>> {
         let turn = step.turn?;
-        Some(self.pose.rotation * UnitComplex::new(turn.yaw_rad))
+        Some(self.pose.rotation * UnitComplex::new(turn.yaw_rad()))
     }
 
     /// The velocity during a scan at `pose`: the mean since the newest anchor, or since the last
@@ -173,12 +188,9 @@ impl TrackerState {
     /// Leaves the map: a new one starts with the last scan, or a later one. If wheels have led to
     /// that, the scans of the map do not constrain the vehicle's position any more.
     pub(super) fn leave_map(&mut self) {
-        self.heading.iter_mut().for_each(Heading::start_map);
-        let distances = [&mut self.wheels, &mut self.doppler];
-        distances
-            .into_iter()
-            .flatten()
-            .for_each(WheelState::start_map);
+        let filters = self.filters.iter_mut().flatten();
+        filters.for_each(Filter::start_map);
+        self.since_match.covariance = Matrix3::zeros();
         if self.anchors[0].is_some_and(|anchor| anchor.age_s == 0.0) {
             self.anchors[1] = None;
         }
@@ -275,6 +287,8 @@ mod tests {
         interval_s: 0.25,
         turn: None,
         distance: None,
+        measured: [None; Witness::ALL.len()],
+        predicted: [None; Witness::ALL.len()],
     };
 
     fn after(poses: &[(f64, f64)]) -> TrackerState {

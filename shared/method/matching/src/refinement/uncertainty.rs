@@ -6,11 +6,11 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use super::{
     Outcome, RefinementConfig, TrackerState,
     alignment::Alignment,
+    candidates::Scan,
     config::{JITTER_DEG, JITTER_M},
-    heading::grown,
+    filter::grown,
     local_map::LocalMap,
     points::DeskewedPoints,
-    registration::Scan,
     standstill::Report,
     tracker::Step,
 };
@@ -48,9 +48,9 @@ impl Uncertainty {
             true => (together + 1.0).powi(2),
             false => grown(1.0, before),
         };
-        let of_predictions = match state.wheels.or(state.doppler) {
-            Some(distance) if predictions > 0 => distance.unmatched,
-            _ => of_prediction(together) * together,
+        let of_predictions = match state.has_distance() && predictions > 0 {
+            true => state.since_match.covariance,
+            false => of_prediction(together) * together,
         };
         Self {
             of_step: of_prediction(1.0),
@@ -175,13 +175,13 @@ fn of_prediction(
     if let Some(distance) = &step.distance {
         let by_gyro = step
             .turn
-            .map(|it| it.variance_after_rad2(distance.since_match));
+            .map(|it| it.variance_after_rad2(&state.since_match));
         let yaw_rad = state.predicted_turn_rad(step);
         return distance
             .motion([yaw_rad, by_gyro.map_or(turn, |it| it.min(turn))])
             .covariance;
     }
-    let turn = step.turn.map_or(turn, |it| it.variance_rad2.min(turn));
+    let turn = step.turn.map_or(turn, |it| it.variance_rad2().min(turn));
     Matrix3::from_diagonal(&Vector3::new(shift, shift, turn))
 }
 

@@ -3,9 +3,9 @@
 
 use gyre_geometry::{
     ComposedMotion, Pose, SparsePoint, pose,
-    samples::{GyroTurn, WheelDistance},
+    samples::{AllEvidence, Evidence, SensorConfigs, Witness},
 };
-use gyre_matching::{Aiding, Refined, RefinementConfig, Refiner};
+use gyre_matching::{Refined, RefinementConfig, Refiner, Searched, Verdict};
 use nalgebra::{Point2, Vector2, Vector3};
 
 use super::Numbers;
@@ -311,11 +311,7 @@ pub fn scans(scene: &[Reflector], drive: &Drive, sensor: &Sensor) -> Vec<Vec<Spa
 }
 
 pub fn refiner() -> Refiner {
-    let config = RefinementConfig {
-        reach_m: VISIBLE_M.end() + 10.0,
-        ..RefinementConfig::default()
-    };
-    Refiner::new(&config, CAPACITY).unwrap()
+    refiner_with(&SensorConfigs::default())
 }
 
 pub fn refine(drive: &Drive, scans: &[Vec<SparsePoint>]) -> Run {
@@ -335,49 +331,77 @@ pub fn refine_on(
 ) -> Vec<Refined> {
     range
         .map(|k| {
-            refiner.refine(
+            refiner.refine(&Searched::by_radar(
                 k as u64 + 1,
                 &scans[k + 1],
                 &scans[k],
                 &searched(drive, k),
                 SWEEP_S,
-            )
+            ))
         })
         .collect()
 }
 
-/// Refines the motions to each scan but the first, with the aiding and the searched motion of each.
+/// Refines the motions to each scan but the first, with the evidence that comes with each scan and
+/// the searched motion.
 pub fn refine_aided(
     refiner: &mut Refiner,
     scans: &[Vec<SparsePoint>],
-    aiding: impl Fn(usize) -> Aiding,
+    evidence: impl Fn(usize) -> AllEvidence,
     mut search: impl FnMut(usize) -> Pose,
 ) -> Vec<Refined> {
+    let evidence: Vec<AllEvidence> = (0..scans.len()).map(evidence).collect();
     let mut refine = |k: usize| {
-        refiner.aiding = aiding(k);
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &search(k), SWEEP_S)
+        refiner.refine(&Searched {
+            evidence: [&evidence[k - 1], &evidence[k]],
+            ..Searched::by_radar(k as u64, &scans[k], &scans[k - 1], &search(k), SWEEP_S)
+        })
     };
     (1..scans.len()).map(&mut refine).collect()
 }
 
-pub fn by_wheels(drive: &Drive, k: usize, factor: f64) -> WheelDistance {
-    let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
-    WheelDistance {
-        distance_m: factor * (to_m - from_m),
-        variance_m2: 1e-4,
-        side_variance_m2: 1e-4,
+pub fn refiner_with(sensors: &SensorConfigs) -> Refiner {
+    let config = RefinementConfig {
+        reach_m: VISIBLE_M.end() + 10.0,
+        ..RefinementConfig::default()
+    };
+    Refiner::new(&config, sensors, CAPACITY).unwrap()
+}
+
+pub fn evidence_of(kind: Witness, evidence: Option<Evidence>) -> AllEvidence {
+    let mut all = AllEvidence::default();
+    all[kind as usize] = evidence.unwrap_or_default();
+    all
+}
+
+/// The scans where a sensor has this verdict.
+pub fn judged(refined: &[Refined], kind: Witness, verdict: Verdict) -> Vec<usize> {
+    scans_where(refined, |it| {
+        it.witnesses[kind as usize].is_some_and(|it| it.verdict == verdict)
+    })
+}
+
+/// The distance to a scan by wheels that show it times a factor.
+pub fn by_wheels(drive: &Drive, k: usize, factor: f64) -> Evidence {
+    let [from_m, to_m] = [k.saturating_sub(1), k].map(|k| drive.length_m(k as f64 * SWEEP_S));
+    Evidence {
+        samples: 1,
         interval_s: SWEEP_S,
+        value: [factor * (to_m - from_m), 0.0],
+        change: 0.0,
+        covariance: [1e-4, 0.0, 1e-4],
     }
 }
 
 /// The turn to a scan by a gyro whose rate is off by so much.
-pub fn by_gyro(drive: &Drive, off_radps: f64) -> GyroTurn {
+pub fn by_gyro(drive: &Drive, off_radps: f64) -> Evidence {
     let rate_radps = drive.yaw_rate_radps + off_radps;
-    GyroTurn {
-        yaw_rad: rate_radps * SWEEP_S,
-        variance_rad2: 1e-9,
+    Evidence {
+        samples: 1,
         interval_s: SWEEP_S,
-        sweep_rate_radps: rate_radps,
+        value: [rate_radps * SWEEP_S, rate_radps],
+        change: 0.0,
+        covariance: [1e-9, 0.0, 0.0],
     }
 }
 

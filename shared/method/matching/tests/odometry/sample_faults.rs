@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use gyre_datasets::{Dataset, SampleLog, ScanSamples, open_source};
 use gyre_geometry::{
     OwnedScan, Pose, SparsePoint,
-    samples::{Gyro, Sample, SampleKind, SensorKind, Wheels},
+    samples::{AllEvidence, Sample, SampleKind, SampledSensors, SensorKind, Witness},
     xy_yaw,
 };
 use gyre_matching::{
-    Refiner, Verdict,
+    Refiner, Searched,
     odometry::{Odometry, OdometryConfig},
 };
 use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
@@ -68,7 +68,8 @@ impl Drive {
             }
         };
         let scans = (0..scans).map(registered).collect();
-        (config.gyro.kind, config.wheels.kind) = (SensorKind::Auto, SensorKind::Auto);
+        let sensors = &mut config.sensors;
+        (sensors.gyro.kind, sensors.wheels.kind) = (SensorKind::Auto, SensorKind::Auto);
         Self {
             scans,
             dataset,
@@ -106,7 +107,7 @@ impl Drive {
         let wheels = write("wheels.csv", "stamp_ns,speed_m_s\n", wheels);
         let dataset = self.dataset.as_ref();
         let files = [gyro, wheels];
-        let mut sensors = self.config.sensors().into_iter().zip(&files);
+        let mut sensors = self.config.sensors.sampled().into_iter().zip(&files);
         sensors.try_fold(ScanSamples::None, |all, (sensor, file)| {
             let samples = SampleLog::read(sensor.of(), file, None)
                 .and_then(|log| ScanSamples::of_log(&log, sensor, dataset));
@@ -116,30 +117,31 @@ impl Drive {
 
     fn refine(&self, samples: &ScanSamples) -> Ran {
         let config = &self.config;
-        let refiner = Refiner::new(&config.refinement, config.points.capacity).unwrap();
-        let mut refiner = refiner.with_sensors(&config.gyro, &config.wheels, &config.doppler);
-        let (mut gyro, mut wheels) = (Gyro::new(&config.gyro), Wheels::new(&config.wheels));
+        let capacity = config.points.capacity;
+        let mut refiner = Refiner::new(&config.refinement, &config.sensors, capacity).unwrap();
+        let mut sensors = SampledSensors::new(&config.sensors);
         let mut counts: BTreeMap<String, u32> = BTreeMap::new();
         let mut motions = Vec::new();
         for (k, scan) in self.scans.iter().enumerate() {
             let of = samples.of(self.dataset.as_ref(), scan.span_ns);
-            gyro.push(&of, scan.stamp_ns, scan.span_ns);
-            wheels.push(&of, scan.stamp_ns, scan.span_ns);
+            sensors.push(&of, scan.stamp_ns, scan.span_ns);
             let Some(before) = k.checked_sub(1).map(|k| &self.scans[k]) else {
                 continue;
             };
-            refiner.aiding.turn = gyro.turn();
-            refiner.aiding.distance = wheels.distance();
             let interval_s = (scan.stamp_ns - before.stamp_ns) as f64 * 1e-9;
             let (later, earlier) = (&scan.points, &before.points);
-            let refined = refiner.refine(k as u64, later, earlier, &scan.searched, interval_s);
+            let motion = &scan.searched;
+            let refined = refiner.refine(&Searched {
+                evidence: [&AllEvidence::default(), &sensors.evidence()],
+                ..Searched::by_radar(k as u64, later, earlier, motion, interval_s)
+            });
             motions.push(xy_yaw(&refined.motion.motion).map(f64::to_bits));
-            let turn = format!("turn {:?}", refined.gyro.map(|it| it.verdict));
-            let distance = format!(
-                "slip {:?}",
-                refined.wheels.map(|it| it.verdict == Verdict::Refused)
-            );
-            for counted in [turn, distance, format!("{:?}", refined.outcome)] {
+            let verdicts = refined.witnesses.map(|it| it.map(|it| it.verdict));
+            let verdicts = Witness::ALL
+                .iter()
+                .zip(verdicts)
+                .map(|it| format!("{it:?}"));
+            for counted in verdicts.chain([format!("{:?}", refined.outcome)]) {
                 *counts.entry(counted).or_default() += 1;
             }
         }

@@ -1,7 +1,7 @@
 //! The velocity on which most bearings agree: by vote, then by least squares with weights that what
 //! contradicts loses (Tukey's biweight).
 
-use gyre_geometry::samples::DopplerVelocity;
+use gyre_geometry::samples::Evidence;
 use nalgebra::{Matrix2, Vector2};
 
 use super::{NoDoppler, rows::REACH, shifts::RowShifts};
@@ -44,7 +44,7 @@ struct Seen {
 }
 
 impl Fit {
-    pub fn velocity(&mut self, rows: &[RowShifts]) -> Result<DopplerVelocity, NoDoppler> {
+    pub fn velocity(&mut self, rows: &[RowShifts]) -> Result<Evidence, NoDoppler> {
         let bearings = rows.len();
         let too_few = |bearings| NoDoppler::TooFewBearings {
             bearings,
@@ -70,10 +70,12 @@ impl Fit {
         let used = self.seen.iter().filter(within).count();
         let covariance = self.covariance(cutoff_mps).filter(|_| used >= MIN_BEARINGS);
         let covariance = covariance.ok_or(too_few(used))?;
-        Ok(DopplerVelocity {
-            velocity_mps: velocity.into(),
+        Ok(Evidence {
+            samples: used as u64,
+            interval_s: 0.0,
+            value: velocity.into(),
+            change: 0.0,
             covariance: [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]],
-            bearings: used as u64,
         })
     }
 

@@ -99,7 +99,7 @@ fn measured(sensor: &Sensor, scatterers: &[Scatterer], velocity: Vector2<f64>) -
     scan
 }
 
-fn estimate(scan: &OwnedScan) -> Result<gyre_geometry::samples::DopplerVelocity, NoDoppler> {
+fn estimate(scan: &OwnedScan) -> Result<gyre_geometry::samples::Evidence, NoDoppler> {
     DopplerEstimator::default().estimate(&scan.view(), MIN_RANGE_M)
 }
 
@@ -119,7 +119,7 @@ proptest! {
         let velocity = Vector2::new(ahead, left);
         let scan = measured(&ras6(sense), &scene(250, seed, moving), velocity);
         let found = estimate(&scan).unwrap();
-        let off = Vector2::from(found.velocity_mps) - velocity;
+        let off = Vector2::from(found.value) - velocity;
         prop_assert!(off.norm() < 0.25, "off by {off}");
         let [xx, xy, yy] = found.covariance;
         prop_assert!(xx > 0.0 && yy > 0.0 && xy * xy < xx * yy);
@@ -138,8 +138,8 @@ proptest! {
         prop_assert_eq!(estimate(&scan).unwrap(), before);
         // With chirps that are taken for the others the vehicle drives backwards.
         scan.flags.iter_mut().for_each(|flags| *flags ^= flag::CHIRP_UP);
-        let backwards = estimate(&scan).unwrap().velocity_mps[0];
-        prop_assert!((backwards + before.velocity_mps[0]).abs() < 1e-6);
+        let backwards = estimate(&scan).unwrap().value[0];
+        prop_assert!((backwards + before.value[0]).abs() < 1e-6);
     }
 }
 

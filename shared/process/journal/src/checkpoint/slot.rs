@@ -130,8 +130,8 @@ pub(super) fn decode_keyframe(slot: &[u8], expected: Name, keyframe: &mut Keyfra
 mod tests {
     #![allow(clippy::unwrap_used)]
     use gyre_geometry::Twist;
-    use gyre_matching::{Anchor, Heading, Verdict, WheelState};
-    use nalgebra::{Complex, Matrix3, UnitComplex};
+    use gyre_matching::{Anchor, Filter, Verdict};
+    use nalgebra::{Complex, Matrix3, Matrix6, UnitComplex};
 
     use super::*;
 
@@ -152,14 +152,10 @@ mod tests {
             },
             age_s: 0.25,
         };
-        let wheels = WheelState {
-            unmatched: Matrix3::from_element(-0.3),
-            slips: true,
-            ..WheelState::default()
-        };
-        let heading = Heading {
+        let filter = Filter {
+            covariance: Matrix6::from_element(-0.3),
             verdict: Verdict::Refused,
-            ..Heading::default()
+            ..Filter::default()
         };
         let mut state = TrackerState {
             pose: pose(),
@@ -168,11 +164,10 @@ mod tests {
             unmatched: u32::MAX,
             along_walls: u32::MAX,
             sliding: u32::MAX,
-            heading: Some(heading),
-            wheels: Some(wheels),
-            doppler: Some(wheels),
+            filters: [Some(filter); 3],
             ..TrackerState::default()
         };
+        state.since_match.covariance = Matrix3::from_element(-0.3);
         (state.standstill.scans, state.standstill.jitter_scans) = (u32::MAX, u32::MAX);
         state
     }

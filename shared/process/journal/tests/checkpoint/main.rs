@@ -7,9 +7,9 @@ mod processes;
 use std::{fs, path::Path};
 
 use gyre_contract::{Item, MotionEstimate, PoseHeader};
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{SparsePoint, samples::SensorConfigs};
 use gyre_journal::checkpoint::{self, Checkpoint};
-use gyre_matching::{Keyframe, RefinementConfig, Refiner};
+use gyre_matching::{Keyframe, RefinementConfig, Refiner, Searched};
 use gyre_storage::LogError;
 use nalgebra::{Isometry2, Vector2};
 
@@ -28,11 +28,13 @@ fn config() -> RefinementConfig {
 }
 
 fn refinement() -> Refiner {
-    Refiner::new(&config(), 512).unwrap()
+    Refiner::new(&config(), &SensorConfigs::default(), 512).unwrap()
 }
 
 fn open_with(path: &Path, config: &RefinementConfig, window: usize) -> Checkpoint {
-    let cells = Refiner::new(config, 512).unwrap().keyframe_cells();
+    let cells = Refiner::new(config, &SensorConfigs::default(), 512)
+        .unwrap()
+        .keyframe_cells();
     Checkpoint::open(path, window, config.keyframes, cells).unwrap()
 }
 
@@ -72,13 +74,13 @@ fn process(refinement: &mut Refiner, checkpoint: &mut Checkpoint, items: std::op
 
 fn step(refinement: &mut Refiner, world: u64, item: u64) {
     let searched = Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0);
-    refinement.refine(
+    refinement.refine(&Searched::by_radar(
         item,
         &scan(world, item),
         &scan(world, item - 1),
         &searched,
         INTERVAL_S,
-    );
+    ));
 }
 
 /// The whole state of a refiner to the bit: numbers are printed with all their digits.
@@ -197,12 +199,12 @@ fn the_file_of_another_configuration_is_overwritten() {
         cell_m: 2.0,
         ..config()
     };
-    let mut refinement = Refiner::new(&other, 512).unwrap();
+    let mut refinement = Refiner::new(&other, &SensorConfigs::default(), 512).unwrap();
     let mut checkpoint = open_with(&path, &other, WINDOW);
     assert!(checkpoint.restore(19, &mut refinement).is_err());
     process(&mut refinement, &mut checkpoint, 1..10);
     drop(checkpoint);
-    let mut again = Refiner::new(&other, 512).unwrap();
+    let mut again = Refiner::new(&other, &SensorConfigs::default(), 512).unwrap();
     open_with(&path, &other, WINDOW)
         .restore(9, &mut again)
         .unwrap();

@@ -39,7 +39,7 @@ struct Process {
 impl Process {
     fn start(path: &Path) -> Self {
         Self {
-            refiner: Refiner::new(&small(), 512).unwrap(),
+            refiner: Refiner::new(&small(), &SensorConfigs::default(), 512).unwrap(),
             checkpoint: open_with(path, &small(), 2),
             next: None,
         }
@@ -70,7 +70,9 @@ impl Process {
                 let [later, earlier] = [item, previous].map(|k| posts(k as f64 * speed));
                 let searched = Isometry2::new(Vector2::new(speed, 0.0), 0.0);
                 self.refiner
-                    .refine(item, &later, &earlier, &searched, INTERVAL_S)
+                    .refine(&Searched::by_radar(
+                        item, &later, &earlier, &searched, INTERVAL_S,
+                    ))
                     .motion
                     .motion
             }

@@ -1,13 +1,10 @@
-//! The samples of a live gyro and of live wheels: what arrives in datagrams, or comes with the
+//! The samples of live sensors beside the radar: what arrives in datagrams, or comes with the
 //! radar, is handed over with the scan that it belongs to.
 
 use std::{mem, os::fd::BorrowedFd, time::Duration};
 
 use gyre_contract::ScanHeader;
-use gyre_geometry::samples::{
-    GyroConfig, LiveSamples, MAX_SAMPLES, Sample, SampleKind, SensorConfig, WheelsConfig,
-};
-use serde::de::DeserializeOwned;
+use gyre_geometry::samples::{LiveSamples, MAX_SAMPLES, Sample, SampleKind, SensorConfig};
 
 use super::Sensor;
 use crate::{Launch, datagrams::Receiver};
@@ -37,11 +34,9 @@ struct Live {
 impl LiveSensors {
     /// Opens the samples of the sections of live sensors; `None` without one.
     pub fn open(launch: &Launch) -> Result<Option<Self>, RunError> {
-        let all = [
-            Live::open::<GyroConfig>(launch)?,
-            Live::open::<WheelsConfig>(launch)?,
-        ];
-        let sensors: Vec<Live> = all.into_iter().flatten().collect();
+        let all = launch.sensors()?;
+        let live = all.sampled().into_iter().filter(|it| it.kind().is_live());
+        let sensors: Vec<Live> = live.map(Live::open).collect::<Result<_, _>>()?;
         let max_wait_ms = sensors.iter().map(|it| it.max_wait_ms).fold(0.0, f64::max);
         Ok((!sensors.is_empty()).then(|| Self {
             sensors,
@@ -93,7 +88,7 @@ impl LiveSensors {
             let so_far = self.left_out;
             tracing::warn!(
                 so_far,
-                "samples of the gyro or of the wheels are late, unusable or too many, and left out"
+                "samples of sensors beside the radar are late, unusable or too many, and left out"
             );
             self.said_at = 2 * so_far;
         }
@@ -101,20 +96,15 @@ impl LiveSensors {
 }
 
 impl Live {
-    /// Opens the sensor of a section; `None` if it is not live.
-    fn open<C: SensorConfig + Default + DeserializeOwned + 'static>(
-        launch: &Launch,
-    ) -> Result<Option<Self>, RunError> {
-        let kind = C::default().of();
-        let config: C = launch.section(kind.section())?;
-        let receiver = config.receives().then(|| Receiver::open(&config));
-        Ok(config.kind().is_live().then_some(Self {
-            kind,
+    fn open(config: &dyn SensorConfig) -> Result<Self, RunError> {
+        let receiver = config.receives().then(|| Receiver::open(config));
+        Ok(Self {
+            kind: config.of(),
             receiver: receiver.transpose()?,
             max_wait_ms: config.max_wait_ms(),
-            samples: LiveSamples::new(Box::new(config)),
+            samples: LiveSamples::new(config.boxed()),
             unreadable: 0,
-        }))
+        })
     }
 
     fn newly_left_out(&mut self) -> usize {
