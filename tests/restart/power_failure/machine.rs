@@ -4,7 +4,7 @@ use std::{fs, path::Path, sync::OnceLock, time::Duration};
 
 use gyre::{
     earlier::{self, Begun, Earlier},
-    program,
+    plan,
 };
 use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_contract::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag, run::Ending};
@@ -53,7 +53,7 @@ impl Machine {
         ]
         .map(str::to_owned);
         let configuration = Configuration::of_overrides(&overrides).unwrap();
-        let programs = program::now(&configuration).unwrap();
+        let programs = plan::programs(&configuration).unwrap();
         Self {
             configuration,
             programs,

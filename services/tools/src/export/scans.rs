@@ -13,10 +13,10 @@ use gyre_ros2_messages::{
 
 use crate::{
     export::{
-        arguments::ScanForm,
+        ScanForm,
         source::{Lost, Scans, Source},
     },
-    radar_server::configuration,
+    radar_server,
 };
 
 const CONFIGURATION: &str = "/radar_data/configuration_data";
@@ -104,7 +104,7 @@ impl Losses {
         Ok(Radar {
             bin_size: 0,
             packet_rate: 0,
-            ..configuration(scans.dataset.as_ref(), geometry, encoder.counts)?
+            ..radar_server::radar(scans.dataset.as_ref(), geometry, encoder.counts)?
         })
     }
 

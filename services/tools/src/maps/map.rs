@@ -1,13 +1,11 @@
 //! `gyre map`: draws the map of a run.
 
 mod arguments;
-mod extend;
 pub mod placing;
 
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    process::ExitCode,
 };
 
 use gyre_configuration::{
@@ -38,17 +36,16 @@ const ODOMETRY: &str = "trajectory.tum";
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
 /// asked for.
-pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
+pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
     let mut drawing = match &arguments.extend {
-        Some(map) => extend::extend(arguments, map)?,
+        Some(map) => placing::extend(arguments, map)?,
         None => draw_run(arguments)?,
     };
     let (keyframes, tiles) = (drawing.keyframes(), drawing.evidence().tiles().len());
     let out = arguments.out.display();
     print::line(format_args!(
         "{keyframes} keyframes in {tiles} tiles, in {out}"
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    ))
 }
 
 fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
