@@ -19,6 +19,8 @@ const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
 /// A delay or a scale that is off by more than so many standard deviations is wrong.
 const SIGMAS: f64 = 4.0;
+/// Smaller delays, s, are no error: the filter of the sensor takes them off.
+const MIN_DELAY_S: f64 = 0.05;
 /// Delay and scale are measured over so many motions: an hour.
 const MOTIONS_OF_DELAY: usize = 1 << 14;
 
@@ -39,6 +41,17 @@ pub struct SensorCount {
     /// The delay of its stamps, s, and its scale against the radar over the whole run, each with its
     /// standard deviation; `None`: they are unknown.
     pub delay_and_scale: Option<[[f64; 2]; 2]>,
+}
+
+impl SensorCount {
+    /// Returns the delay of its stamps and the standard deviation, s: over the whole run where that
+    /// is certain, else as the filter has learnt it; `None`: it is unknown.
+    fn delay_s(&self) -> Option<[f64; 2]> {
+        let whole = self.delay_and_scale.map(|[delay_s, _]| delay_s);
+        let learnt = [self.last.delay_s, self.last.delay_sigma_s];
+        let is_learnt = learnt[1] > 0.0 && !whole.is_some_and(is_off);
+        if is_learnt { Some(learnt) } else { whole }
+    }
 }
 
 /// Of each kind; `None`: it has measured nothing.
@@ -89,10 +102,7 @@ impl Serialize for Named<'_> {
             }
         }
         if row.samples.is_some() {
-            map.serialize_entry(
-                "delay_s",
-                &count.delay_and_scale.map(|[delay_s, _]| delay_s),
-            )?;
+            map.serialize_entry("delay_s", &count.delay_s())?;
         }
         map.end()
     }
@@ -211,7 +221,7 @@ pub fn problem(
             Measures::Heading => too_many(contradictions, it.motions, MAX_DOUBTED_SHARE),
         };
         let section = kind.name();
-        let cause = cause(kind, sensors.of(kind)?, it.delay_and_scale, is_wrong)?;
+        let cause = cause(kind, sensors.of(kind)?, it, is_wrong)?;
         let motions = it.motions;
         Some(match kind.row().measures {
             Measures::Turn => format!(
@@ -236,7 +246,7 @@ pub fn problem(
 fn cause(
     kind: Witness,
     config: &dyn SensorConfig,
-    measured: Option<[[f64; 2]; 2]>,
+    it: &SensorCount,
     is_wrong: bool,
 ) -> Option<String> {
     let section = kind.name();
@@ -244,16 +254,17 @@ fn cause(
         Measures::Turn => "`gyro.up`, ",
         Measures::Distance | Measures::Heading => "",
     };
-    let is_late = |[delay_s, sigma_s]: [f64; 2]| delay_s.abs() > SIGMAS * sigma_s;
     let (set_scale, max_error) = config.scale();
+    let is_late = |delay: &[f64; 2]| is_off(*delay) && delay[0].abs() > MIN_DELAY_S;
     let is_scaled =
-        |[scale, sigma]: [f64; 2]| (scale - 1.0).abs() > max_error.hypot(SIGMAS * sigma);
-    match measured {
-        Some([[delay_s, sigma_s], _]) if is_late([delay_s, sigma_s]) => Some(format!(
+        |[scale, sigma]: &[f64; 2]| (scale - 1.0).abs() > max_error.hypot(SIGMAS * sigma);
+    let scale = it.delay_and_scale.map(|[_, scale]| scale).filter(is_scaled);
+    match (it.delay_s().filter(is_late), scale) {
+        (Some([delay_s, sigma_s]), _) => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
             config.delay_s() + delay_s
         )),
-        Some([_, [scale, sigma]]) if is_scaled([scale, sigma]) => Some(format!(
+        (None, Some([scale, sigma])) => Some(format!(
             "the true values are {scale:.3} \u{b1} {sigma:.3} times the measured ones: set {section}.scale={:.3}, which `gyre calibrate` finds too",
             set_scale * scale
         )),
@@ -266,6 +277,10 @@ fn cause(
             )
         }),
     }
+}
+
+fn is_off([value, sigma]: [f64; 2]) -> bool {
+    value.abs() > SIGMAS * sigma
 }
 
 pub fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {
