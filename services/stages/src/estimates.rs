@@ -98,11 +98,10 @@ fn witness(witnessed: Option<Witnessed>) -> WitnessRecord {
             Verdict::Refused => verdict::REFUSED,
         },
         measured: of.measured,
+        registered: of.registered,
         scale: of.scale,
         scale_sigma: of.scale_sigma,
         bias: of.bias,
         bias_sigma: of.bias_sigma,
-        delay_s: of.delay_s,
-        delay_sigma_s: of.delay_sigma_s,
     }
 }

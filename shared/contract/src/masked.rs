@@ -62,9 +62,6 @@ describe! {
         /// From the stamp of the scan before to the stamp of the scan, s; zero of a velocity.
         interval_s: f64 [Bounds::NotNegative],
         value: [f64; 2] [Bounds::Finite],
-        /// The rate of the first value at the stamp of the scan minus the rate at the stamp of the scan
-        /// before, per second: the error of the value by a delay of 1 s.
-        change: f64 [Bounds::Finite],
         /// Variance of the first value, covariance, variance of the second, but for the errors that
         /// all motions share: bias and scale.
         covariance: [f64; 3] [Bounds::Covariance2],

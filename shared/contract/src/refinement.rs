@@ -50,15 +50,14 @@ wire! {
         /// The turn (rad) or the distance (m) since the previous scan that it measured, or the
         /// heading (rad).
         pub measured: f64 [Bounds::Finite],
+        /// The same turn or distance by the registration alone; zero without a match.
+        pub registered: f64 [Bounds::Finite],
         /// The true value over the measured one, after the scan.
         pub scale: f64 [Bounds::Finite],
         pub scale_sigma: f64 [Bounds::Finite],
         /// Bias after the scan, rad/s; the offset of an absolute heading, rad; zero of a distance.
         pub bias: f64 [Bounds::Finite],
         pub bias_sigma: f64 [Bounds::Finite],
-        /// Delay of its stamps beyond the configured one, s.
-        pub delay_s: f64 [Bounds::Finite],
-        pub delay_sigma_s: f64 [Bounds::Finite],
     }
 
     /// The result of a refinement; all zero without one.

@@ -384,7 +384,6 @@ sensor_config! { GyroConfig is Gyro on "/imu/data":
             samples: integral.samples,
             interval_s: integral.interval_s,
             value: [integral.sum, sweep_rate_radps?],
-            change: integral.change,
             covariance: [walk + by_time * by_time, 0.0, 0.0],
         })
     }

@@ -72,7 +72,6 @@ impl DopplerConfig {
             samples: later.samples,
             interval_s,
             value: [ahead * interval_s, left * interval_s],
-            change: 0.0,
             covariance: [variance(of_ahead), 0.0, variance(of_left)],
         }
     }
@@ -93,7 +92,6 @@ mod tests {
             samples: 100,
             interval_s: 0.0,
             value,
-            change: 0.0,
             covariance: [sigma * sigma, 0.0, 4.0 * sigma * sigma],
         }
     }

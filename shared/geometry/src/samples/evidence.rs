@@ -16,9 +16,6 @@ pub struct Evidence {
     pub interval_s: f64,
     /// What they are depends on the kind: see [`Witness`].
     pub value: [f64; 2],
-    /// The rate of the first value at the stamp of the scan minus the rate at the stamp of the scan
-    /// before, per second: the error of the value by a delay of 1 s.
-    pub change: f64,
     /// Variance of the first value, covariance, variance of the second, but for the errors that all
     /// motions share: bias and scale.
     pub covariance: [f64; 3],
@@ -32,7 +29,6 @@ impl Evidence {
         samples: 0,
         interval_s: 0.0,
         value: [0.0; 2],
-        change: 0.0,
         covariance: [0.0; 3],
     };
 

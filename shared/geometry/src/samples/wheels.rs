@@ -124,7 +124,6 @@ sensor_config! { WheelsConfig is Wheels on "/odom":
             samples: integral.samples,
             interval_s: integral.interval_s,
             value: [integral.sum, 0.0],
-            change: integral.change,
             covariance: [ahead_m2, 0.0, of_rolling],
         })
     }

@@ -40,7 +40,6 @@ fn refine_with(
             samples: 200,
             interval_s: 0.0,
             value: [speed_mps + noise_mps(), noise_mps()],
-            change: 0.0,
             covariance: [SIGMA_MPS.powi(2), 0.0, SIGMA_MPS.powi(2)],
         })
     };

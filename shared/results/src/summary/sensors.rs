@@ -19,8 +19,6 @@ const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
 /// A delay or a scale that is off by more than so many standard deviations is wrong.
 const SIGMAS: f64 = 4.0;
-/// Smaller delays, s, are no error: the filter of the sensor takes them off.
-const MIN_DELAY_S: f64 = 0.05;
 /// Delay and scale are measured over so many motions: an hour.
 const MOTIONS_OF_DELAY: usize = 1 << 14;
 
@@ -41,17 +39,6 @@ pub struct SensorCount {
     /// The delay of its stamps, s, and its scale against the radar over the whole run, each with its
     /// standard deviation; `None`: they are unknown.
     pub delay_and_scale: Option<[[f64; 2]; 2]>,
-}
-
-impl SensorCount {
-    /// Returns the delay of its stamps and the standard deviation, s: over the whole run where that
-    /// is certain, else as the filter has learnt it; `None`: it is unknown.
-    fn delay_s(&self) -> Option<[f64; 2]> {
-        let whole = self.delay_and_scale.map(|[delay_s, _]| delay_s);
-        let learnt = [self.last.delay_s, self.last.delay_sigma_s];
-        let is_learnt = learnt[1] > 0.0 && !whole.is_some_and(is_off);
-        if is_learnt { Some(learnt) } else { whole }
-    }
 }
 
 /// Of each kind; `None`: it has measured nothing.
@@ -102,7 +89,7 @@ impl Serialize for Named<'_> {
             }
         }
         if row.samples.is_some() {
-            map.serialize_entry("delay_s", &count.delay_s())?;
+            map.serialize_entry("delay_s", &count.delay_and_scale.map(|it| it[0]))?;
         }
         map.end()
     }
@@ -116,16 +103,13 @@ pub struct SensorCounter {
 
 impl SensorCounter {
     pub fn add(&mut self, pose: &PoseHeader) {
-        let (motion, record) = (&pose.motion, &pose.motion.refinement);
+        let record = &pose.motion.refinement;
         for (kind, _) in Witness::sampled() {
-            let by_radar = match kind.row().measures {
-                // A registered turn depends on the gyro.
-                Measures::Turn => motion.searched[2],
-                Measures::Distance => motion.x_m,
-                // A heading, whose offset is unknown, is no motion.
-                Measures::Heading => continue,
-            };
-            self.clocks[kind as usize].add(pose, by_radar, record.of(kind).measured());
+            // A heading, whose offset is unknown, is no motion.
+            if kind.row().measures != Measures::Heading {
+                let of = record.of(kind);
+                self.clocks[kind as usize].add(pose, of.registered, of.measured());
+            }
         }
         let is_predicted = record.outcome == outcome::PREDICTED;
         for kind in Witness::ALL {
@@ -255,11 +239,11 @@ fn cause(
         Measures::Distance | Measures::Heading => "",
     };
     let (set_scale, max_error) = config.scale();
-    let is_late = |delay: &[f64; 2]| is_off(*delay) && delay[0].abs() > MIN_DELAY_S;
+    let is_late = |[delay_s, sigma_s]: &[f64; 2]| delay_s.abs() > SIGMAS * sigma_s;
     let is_scaled =
         |[scale, sigma]: &[f64; 2]| (scale - 1.0).abs() > max_error.hypot(SIGMAS * sigma);
-    let scale = it.delay_and_scale.map(|[_, scale]| scale).filter(is_scaled);
-    match (it.delay_s().filter(is_late), scale) {
+    let [delay, scale] = it.delay_and_scale.map_or([None; 2], |it| it.map(Some));
+    match (delay.filter(is_late), scale.filter(is_scaled)) {
         (Some([delay_s, sigma_s]), _) => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
             config.delay_s() + delay_s
@@ -277,10 +261,6 @@ fn cause(
             )
         }),
     }
-}
-
-fn is_off([value, sigma]: [f64; 2]) -> bool {
-    value.abs() > SIGMAS * sigma
 }
 
 pub fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {

@@ -1,6 +1,6 @@
 //! One coordinate of the vehicle by another sensor and the radar together: an error-state Kalman
-//! filter (Solà 2017, 5 to 7) over the coordinate, the drift of the radar, the bias, the scale and
-//! the delay of the sensor, and the offset of an absolute heading. The coordinate is the heading, or the place
+//! filter (Solà 2017, 5 to 7) over the coordinate, the drift of the radar, the bias and the scale of
+//! the sensor, and the offset of an absolute heading. The coordinate is the heading, or the place
 //! along the path.
 //!
 //! The radar measures it in the local map. A registration errs by white jitter, which the next
@@ -13,7 +13,7 @@ use gyre_geometry::{
     samples::{Evidence, GyroConfig, SensorConfig, SensorConfigs, Witness},
     wrap_angle,
 };
-use nalgebra::{Matrix6, RowVector6, Vector6};
+use nalgebra::{Matrix5, RowVector5, Vector5};
 use serde::{Deserialize, Serialize};
 
 use super::Witnessed;
@@ -28,9 +28,6 @@ const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 /// Random walk of the scale of wheels and Doppler, /√s: tyres that warm change it by 0.06 % in an
 /// hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
-/// Standard deviation of the delay of a sensor with stamps of its own, s, beyond the configured
-/// delay.
-const DELAY_S: f64 = 0.05;
 /// Standard deviation of the offset of an absolute heading, rad: any angle.
 const OFFSET_RAD: f64 = 2.0;
 /// Random walk of that offset, rad/√s: errors of a receiver or a compass that last.
@@ -41,12 +38,11 @@ const VALUE: usize = 0;
 const DRIFT: usize = 1;
 const BIAS: usize = 2;
 const SCALE: usize = 3;
-const DELAY: usize = 4;
-const OFFSET: usize = 5;
+const OFFSET: usize = 4;
 /// The part that each has in a registered coordinate.
-const SEEN: RowVector6<f64> = RowVector6::new(1.0, 1.0, 0.0, 0.0, 0.0, 0.0);
+const SEEN: RowVector5<f64> = RowVector5::new(1.0, 1.0, 0.0, 0.0, 0.0);
 /// The part that each has in a measured absolute heading.
-const OBSERVED: RowVector6<f64> = RowVector6::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+const OBSERVED: RowVector5<f64> = RowVector5::new(1.0, 0.0, 0.0, 0.0, 1.0);
 
 /// The coordinate, the drift of the map in it, and the bias and the scale of the sensor: rad for
 /// the heading, m along the path.
@@ -60,12 +56,10 @@ pub struct Filter {
     pub bias: f64,
     /// True change over the measured change, but for the bias.
     pub scale: f64,
-    /// Delay of the stamps beyond the configured delay, s.
-    pub delay_s: f64,
     /// Measured absolute heading minus the heading, rad.
     pub offset_rad: f64,
-    /// Covariance of the errors of coordinate, drift, bias, scale, delay and offset.
-    pub covariance: Matrix6<f64>,
+    /// Covariance of the errors of coordinate, drift, bias, scale and offset.
+    pub covariance: Matrix5<f64>,
     pub verdict: Verdict,
     /// The verdict on the absolute heading.
     pub offset_verdict: Verdict,
@@ -94,7 +88,6 @@ pub(super) struct SharedErrors {
     scale_walk_per_sqrt_s: f64,
     /// The farthest that a learnt scale can be from 1.
     max_scale_error: f64,
-    delay_sigma_s: f64,
     /// Noise that the measurement does not state, per √s.
     noise_per_sqrt_s: f64,
 }
@@ -102,22 +95,21 @@ pub(super) struct SharedErrors {
 impl SharedErrors {
     /// Returns the errors of each kind, in the order of [`Witness::ALL`].
     pub fn of(configs: &SensorConfigs) -> [Self; Witness::ALL.len()] {
-        let of_distance = |scale_sigma: f64, max_scale_error: f64, delay_sigma_s: f64| Self {
+        let of_distance = |scale_sigma: f64, max_scale_error: f64| Self {
             bias: 0.0,
             bias_sigma: 0.0,
             bias_walk_per_sqrt_s: 0.0,
             scale_sigma,
             scale_walk_per_sqrt_s: SCALE_WALK_PER_SQRT_S,
             max_scale_error,
-            delay_sigma_s,
             noise_per_sqrt_s: 0.0,
         };
         let (wheels, doppler) = (&configs.wheels, configs.doppler.scale_sigma);
         Witness::ALL.map(|kind| match kind {
             Witness::Gyro => Self::of_gyro(&configs.gyro),
-            Witness::Wheels => of_distance(wheels.scale_sigma, wheels.scale().1, DELAY_S),
+            Witness::Wheels => of_distance(wheels.scale_sigma, wheels.scale().1),
             // An absolute heading has no filter of its own.
-            _ => of_distance(doppler, 4.0 * doppler, 0.0),
+            _ => of_distance(doppler, 4.0 * doppler),
         })
     }
 
@@ -129,7 +121,6 @@ impl SharedErrors {
             scale_sigma: config.scale_sigma,
             scale_walk_per_sqrt_s: 0.0,
             max_scale_error: config.max_scale_error(),
-            delay_sigma_s: DELAY_S,
             noise_per_sqrt_s: TILT_RAD_PER_SQRT_S,
         }
     }
@@ -144,14 +135,12 @@ pub(super) struct Predicted {
     pub in_map: f64,
     pub measured: f64,
     pub interval_s: f64,
-    /// The variance by the delay.
-    by_delay: f64,
     /// The variance of the change that is of neither bias nor scale.
     pub noise: f64,
     bias_variance: f64,
     scale_variance: f64,
     /// The covariance of the filter at the scan, if the coordinate is the predicted one.
-    covariance: Matrix6<f64>,
+    covariance: Matrix5<f64>,
 }
 
 impl Predicted {
@@ -160,7 +149,6 @@ impl Predicted {
     /// up: the squares of these errors grow with the squares of the time and of the change.
     pub fn variance_after(&self, [time_s, changed]: [f64; 2]) -> f64 {
         self.noise
-            + self.by_delay
             + self.bias_variance * grown(self.interval_s, time_s)
             + self.scale_variance * grown(self.measured, changed)
     }
@@ -170,12 +158,11 @@ impl Predicted {
     pub fn variance_with(&self, [time_s, changed]: [f64; 2]) -> f64 {
         let (interval_s, change) = (self.interval_s, self.measured.abs());
         self.noise
-            + self.by_delay
             + self.bias_variance * interval_s * time_s.max(interval_s)
             + self.scale_variance * change * changed.max(change)
     }
 
-    fn of_shared_errors(&self) -> f64 {
+    fn of_bias_and_scale(&self) -> f64 {
         self.variance_after([0.0, 0.0]) - self.noise
     }
 }
@@ -198,27 +185,25 @@ pub(super) struct Seen {
 
 impl Filter {
     pub(super) fn new(errors: &SharedErrors) -> Self {
-        let [bias, scale] = [errors.bias_sigma, errors.scale_sigma];
-        let sigmas = Vector6::new(0.0, 0.0, bias, scale, errors.delay_sigma_s, OFFSET_RAD);
+        let sigmas = Vector5::new(0.0, 0.0, errors.bias_sigma, errors.scale_sigma, OFFSET_RAD);
         Self {
             bias: errors.bias,
             scale: 1.0,
-            covariance: Matrix6::from_diagonal(&sigmas.component_mul(&sigmas)),
+            covariance: Matrix5::from_diagonal(&sigmas.component_mul(&sigmas)),
             ..Self::default()
         }
     }
 
-    pub(super) fn witnessed(&self, measured: f64) -> Witnessed {
+    pub(super) fn witnessed(&self, measured: f64, registered: f64) -> Witnessed {
         let sigma = |state| self.covariance[(state, state)].max(0.0).sqrt();
         Witnessed {
             verdict: self.verdict,
             measured,
+            registered,
             scale: self.scale,
             scale_sigma: sigma(SCALE),
             bias: self.bias,
             bias_sigma: sigma(BIAS),
-            delay_s: self.delay_s,
-            delay_sigma_s: sigma(DELAY),
         }
     }
 
@@ -238,18 +223,16 @@ impl Filter {
     pub(super) fn predict(&self, measured: &Evidence, errors: &SharedErrors) -> Predicted {
         let (time_s, value) = (measured.interval_s, measured.value[0]);
         let noise = measured.covariance[0] + errors.noise_per_sqrt_s.powi(2) * time_s;
-        let mut step = Matrix6::identity();
+        let mut step = Matrix5::identity();
         (step[(VALUE, BIAS)], step[(VALUE, SCALE)]) = (-time_s, value);
-        step[(VALUE, DELAY)] = measured.change;
         let mut covariance = step * self.covariance * step.transpose();
         covariance[(VALUE, VALUE)] += noise;
-        let change = self.scale * value - self.bias * time_s + self.delay_s * measured.change;
+        let change = self.scale * value - self.bias * time_s;
         Predicted {
             change,
             in_map: change + self.jitter(),
             measured: value,
             interval_s: time_s,
-            by_delay: self.covariance[(DELAY, DELAY)] * measured.change.powi(2),
             noise,
             bias_variance: covariance[(BIAS, BIAS)],
             scale_variance: covariance[(SCALE, SCALE)],
@@ -269,7 +252,7 @@ impl Filter {
         let apart = seen.change - predicted.in_map;
         let mut variance = (SEEN * predicted.covariance * SEEN.transpose())[0];
         if self.verdict == Verdict::Refused {
-            variance -= predicted.of_shared_errors();
+            variance -= predicted.of_bias_and_scale();
         }
         if apart.powi(2) <= GATE * (variance + seen.jitter + seen.drift) {
             Verdict::Agrees
@@ -302,7 +285,7 @@ impl Filter {
 
     /// The update of the Kalman filter by a measurement that is `apart` from its prediction, of
     /// which the states have these parts.
-    fn correct_by(&mut self, apart: f64, parts: &RowVector6<f64>, variance: f64) {
+    fn correct_by(&mut self, apart: f64, parts: &RowVector5<f64>, variance: f64) {
         let across = self.covariance * parts.transpose();
         let gain = across / ((parts * across)[0] + variance);
         let step = gain * apart;
@@ -310,10 +293,9 @@ impl Filter {
         self.drift += step[DRIFT];
         self.bias += step[BIAS];
         self.scale += step[SCALE];
-        self.delay_s += step[DELAY];
         self.offset_rad += step[OFFSET];
         // Joseph's form stays symmetric and positive.
-        let kept = Matrix6::identity() - gain * parts;
+        let kept = Matrix5::identity() - gain * parts;
         self.covariance =
             kept * self.covariance * kept.transpose() + gain * gain.transpose() * variance;
     }
@@ -339,12 +321,11 @@ impl Filter {
         Witnessed {
             verdict: self.offset_verdict,
             measured: measured_rad,
+            registered: 0.0,
             scale: 1.0,
             scale_sigma: 0.0,
             bias: self.offset_rad,
             bias_sigma: self.covariance[(OFFSET, OFFSET)].max(0.0).sqrt(),
-            delay_s: 0.0,
-            delay_sigma_s: 0.0,
         }
     }
 
@@ -398,7 +379,7 @@ impl Filter {
 
     /// Makes the error of one state that of another with the other sign.
     fn tie(&mut self, state: usize, to: usize) {
-        let mut step = Matrix6::identity();
+        let mut step = Matrix5::identity();
         (step[(state, state)], step[(state, to)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
     }

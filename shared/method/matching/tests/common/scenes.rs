@@ -388,7 +388,6 @@ pub fn by_wheels(drive: &Drive, k: usize, factor: f64) -> Evidence {
         samples: 1,
         interval_s: SWEEP_S,
         value: [factor * (to_m - from_m), 0.0],
-        change: 0.0,
         covariance: [1e-4, 0.0, 1e-4],
     }
 }
@@ -400,7 +399,6 @@ pub fn by_gyro(drive: &Drive, off_radps: f64) -> Evidence {
         samples: 1,
         interval_s: SWEEP_S,
         value: [rate_radps * SWEEP_S, rate_radps],
-        change: 0.0,
         covariance: [1e-9, 0.0, 0.0],
     }
 }

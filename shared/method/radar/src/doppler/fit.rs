@@ -74,7 +74,6 @@ impl Fit {
             samples: used as u64,
             interval_s: 0.0,
             value: velocity.into(),
-            change: 0.0,
             covariance: [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]],
         })
     }

@@ -131,7 +131,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use gyre_geometry::Twist;
     use gyre_matching::{Anchor, Filter, Verdict};
-    use nalgebra::{Complex, Matrix3, Matrix6, UnitComplex};
+    use nalgebra::{Complex, Matrix3, Matrix5, UnitComplex};
 
     use super::*;
 
@@ -153,7 +153,7 @@ mod tests {
             age_s: 0.25,
         };
         let filter = Filter {
-            covariance: Matrix6::from_element(-0.3),
+            covariance: Matrix5::from_element(-0.3),
             verdict: Verdict::Refused,
             ..Filter::default()
         };
