@@ -66,7 +66,7 @@ pub fn stat(pid: Pid) -> Option<Vec<String>> {
     Some(fields.split(' ').map(str::to_owned).collect())
 }
 
-/// What the system says of a process in the line of `/proc/PID/status` with this name.
+/// Returns the text of the system about a process in the line of `/proc/PID/status` with this name.
 pub fn status(pid: Pid, name: &str) -> Option<String> {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
     let mut lines = status.lines().filter_map(|line| line.split_once(':'));

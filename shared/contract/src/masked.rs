@@ -140,8 +140,8 @@ impl MaskedHeader {
         self.evidence[kind as usize].measured()
     }
 
-    /// Returns the turn since the scan before by the gyro, rad, which limits a search for it; `None`
-    /// if it was not measured.
+    /// Returns the turn since the scan before by the gyro, rad, which limits a search for it;
+    /// `None` if it was not measured.
     pub fn turn_rad(&self) -> Option<f64> {
         self.of(Witness::Gyro).map(|turn| turn.value[0])
     }

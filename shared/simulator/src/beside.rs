@@ -27,7 +27,7 @@ pub struct Kind {
     pub header: &'static str,
     /// The value of a sample in each column after the stamp.
     columns: &'static [usize],
-    /// What a simulation without it lacks, in words.
+    /// The lack of a simulation without it, in words.
     pub lacks: &'static str,
 }
 

@@ -14,7 +14,7 @@ pub struct Evidence {
     /// From the stamp of the scan before to the stamp of the scan, s; zero of a velocity during the
     /// scan.
     pub interval_s: f64,
-    /// What they are depends on the kind: see [`Witness`].
+    /// Quantities of the kind: see [`Witness`].
     pub value: [f64; 2],
     /// Variance of the first value, covariance, variance of the second, but for the errors that all
     /// motions share: bias and scale.

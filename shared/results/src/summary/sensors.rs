@@ -36,8 +36,8 @@ pub struct SensorCount {
     pub predicted: u64,
     /// Scale and bias after the last of these motions.
     pub last: WitnessRecord,
-    /// The delay of its stamps, s, and its scale against the radar over the whole run, each with its
-    /// standard deviation; `None`: they are unknown.
+    /// The delay of its stamps, s, and its scale against the radar over the whole run, each with
+    /// its standard deviation; `None`: they are unknown.
     pub delay_and_scale: Option<[[f64; 2]; 2]>,
 }
 

@@ -307,8 +307,8 @@ fn drives_of_one_sensor_are_combined_if_they_name_one_axis() {
     }
 }
 
-/// The delay and the scale in a run of a sensor whose measurements are so late and scaled, beside a radar with
-/// noise, over 40 s with these rates.
+/// The delay and the scale in a run of a sensor whose measurements are so late and scaled, beside a
+/// radar with noise, over 40 s with these rates.
 fn compared(rate: fn(f64) -> f64, delay_s: f64, scale: f64) -> Option<[Estimate; 2]> {
     let over = |s: f64| {
         let parts = (0..25).map(|k| 0.01 * rate(s - 0.01 * f64::from(k)));

@@ -1,7 +1,7 @@
 //! One coordinate of the vehicle by another sensor and the radar together: an error-state Kalman
-//! filter (Solà 2017, 5 to 7) over the coordinate, the drift of the radar, the bias and the scale of
-//! the sensor, and the offset of an absolute heading. The coordinate is the heading, or the place
-//! along the path.
+//! filter (Solà 2017, 5 to 7) over the coordinate, the drift of the radar, the bias and the scale
+//! of the sensor, and the offset of an absolute heading. The coordinate is the heading, or the
+//! place along the path.
 //!
 //! The radar measures it in the local map. A registration errs by white jitter, which the next
 //! registration takes back, so that the errors of successive motions are correlated; and the map
@@ -126,7 +126,7 @@ impl SharedErrors {
     }
 }
 
-/// What a sensor predicts of the next scan.
+/// The prediction of the next scan by a sensor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Predicted {
     /// The change since the scan before: rad or m.
@@ -329,8 +329,8 @@ impl Filter {
         }
     }
 
-    /// Takes a registered coordinate. A sensor that disagrees with a certain match is refused. If all
-    /// matches together imply an implausible scale, it has been wrong before, and its scale is
+    /// Takes a registered coordinate. A sensor that disagrees with a certain match is refused. If
+    /// all matches together imply an implausible scale, it has been wrong before, and its scale is
     /// learnt again.
     pub(super) fn judge(
         &mut self,

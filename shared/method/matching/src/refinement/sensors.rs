@@ -279,9 +279,9 @@ impl Refiner {
         covariance
     }
 
-    /// Returns the square of a jump of the heading that no sensor has measured, rad², zero of a turn
-    /// that a single match can err by, or that is usual: the whole scan can be turned, as by a slip
-    /// of the encoder, and the next match then takes the jump back.
+    /// Returns the square of a jump of the heading that no sensor has measured, rad², zero of a
+    /// turn that a single match can err by, or that is usual: the whole scan can be turned, as by a
+    /// slip of the encoder, and the next match then takes the jump back.
     fn jump_rad2(&mut self, scan: &Scan<'_>, pose: &Pose) -> f64 {
         if self.state.anchors[0].is_none_or(|anchor| anchor.age_s > 0.0) {
             return 0.0;

@@ -41,8 +41,8 @@ pub struct TrackerState {
     pub standstill: Standstill,
     /// Running mean of the squares of what registered and predicted heading are apart, rad².
     pub mean_jump_rad2: f64,
-    /// The bias and the scale of each sensor, and the like, in the order of [`Witness::ALL`]; `None`
-    /// until it has measured something.
+    /// The bias and the scale of each sensor, and the like, in the order of [`Witness::ALL`];
+    /// `None` until it has measured something.
     pub filters: [Option<Filter>; Witness::ALL.len()],
     pub since_match: SinceMatch,
 }
