@@ -3,7 +3,7 @@
 use std::{fmt, iter};
 
 use crate::configuration::Configuration;
-use crate::message::{Azimuth, KeptAzimuth};
+use crate::message::{Azimuth, KeptAzimuth, Powers};
 
 const SECOND_NS: i64 = 1_000_000_000;
 /// 2001-01-01 and 2101-01-01, s since 1970. A radar whose clock was never set counts from 1970 or
@@ -242,5 +242,19 @@ impl RadarClock {
             nearest.then((a.1, a.2).cmp(&(b.1, b.2)))
         });
         nearest.map(|(.., format)| format)
+    }
+}
+
+impl<'a> Azimuth<'a> {
+    /// An azimuth with a byte per bin at this time, ns since 1970, in a radar's format.
+    pub fn at(encoder: u16, stamp_ns: i64, format: ClockFormat, powers: &'a [u8]) -> Self {
+        let (seconds, split_seconds) = format.fields(stamp_ns);
+        Self {
+            sweep_counter: 0,
+            encoder,
+            seconds,
+            split_seconds,
+            powers: Powers::Eight(powers),
+        }
     }
 }

@@ -113,7 +113,7 @@ fn content(
     report.figure(section, times.figures(file, figures));
 }
 
-/// What the logs of a kind contain, by the period of their samples, s; that of other kinds is their
+/// The content of the logs of a kind, by the period of their samples, s; of other kinds it is their
 /// times alone.
 const CONTENTS: [(SampleKind, fn(&SampleLog, f64) -> Content); 3] = [
     (SampleKind::Gyro, turns),
