@@ -283,8 +283,8 @@ impl Filter {
         variance_before - self.covariance[(VALUE, VALUE)]
     }
 
-    /// The update of the Kalman filter by a measurement that is `apart` from its prediction, of
-    /// which the states have these parts.
+    /// The update of the Kalman filter by a measurement that is `apart` from its prediction. The
+    /// states have these parts in the measurement.
     fn correct_by(&mut self, apart: f64, parts: &RowVector5<f64>, variance: f64) {
         let across = self.covariance * parts.transpose();
         let gain = across / ((parts * across)[0] + variance);
@@ -377,15 +377,15 @@ impl Filter {
         }
     }
 
-    /// Makes the error of one state that of another with the other sign.
+    /// Makes the error of one state the error of another state with the opposite sign.
     fn tie(&mut self, state: usize, to: usize) {
         let mut step = Matrix5::identity();
         (step[(state, state)], step[(state, to)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
     }
 
-    /// Takes the predicted coordinate of a scan without a match, to which the tracker's pose has
-    /// moved by `change`: to the filter's coordinate in the map, or not at all, without an anchor.
+    /// Takes the predicted coordinate of a scan without a match. The tracker's pose has moved by
+    /// `change`: to the filter's coordinate in the map, or not at all, without an anchor.
     pub(super) fn take_prediction(&mut self, change: f64, predicted: &Predicted) {
         self.covariance = predicted.covariance;
         self.correction = -self.drift - (change - predicted.in_map);

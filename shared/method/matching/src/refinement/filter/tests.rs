@@ -84,7 +84,7 @@ impl Drive {
         sigma * self.rng.sample::<f64, _>(StandardNormal)
     }
 
-    /// Drives so far, and returns what the sensor measures.
+    /// Drives so far, and returns the measurement.
     fn drive(&mut self, change: f64) -> Evidence {
         self.truth += change;
         let noise = self.errors.noise_per_sqrt_s.powi(2) * INTERVAL_S + self.noise.powi(2);
