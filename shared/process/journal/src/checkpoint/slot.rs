@@ -129,7 +129,7 @@ pub(super) fn decode_keyframe(slot: &[u8], expected: Name, keyframe: &mut Keyfra
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_geometry::Twist;
+    use gyre_geometry::{Twist, samples::Witness};
     use gyre_matching::{Anchor, Filter, Verdict};
     use nalgebra::{Complex, Matrix3, Matrix5, UnitComplex};
 
@@ -164,7 +164,7 @@ mod tests {
             unmatched: u32::MAX,
             along_walls: u32::MAX,
             sliding: u32::MAX,
-            filters: [Some(filter); 3],
+            filters: [Some(filter); Witness::ALL.len()],
             ..TrackerState::default()
         };
         state.since_match.covariance = Matrix3::from_element(-0.3);
