@@ -50,10 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         stamps.push(scan.geometry.stamp_ns);
         poses.push(registered.pose.motion);
     }
-    let trajectory = Trajectory {
-        stamp_ns: Some(stamps),
-        poses,
-    };
+    let trajectory = Trajectory::timed(stamps, poses);
     write_tum(&trajectory, &mut io::stdout().lock())?;
     Ok(())
 }

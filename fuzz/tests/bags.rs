@@ -8,7 +8,6 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_geometry::OwnedScan;
 use gyre_ros2_messages::radar::ScanMessages;
 use mcap::WriteOptions;
 
@@ -75,13 +74,12 @@ fn write(path: &Path, messages: &Messages, chunks: bool) {
 fn use_bag(path: &Path) -> Result<(), Failure> {
     let mut dataset = gyre_recording::bags::open(path, &DatasetOptions::default())?;
     let mut refused = None;
-    let mut scan = OwnedScan::with_limits(dataset.limits());
     for index in (0..dataset.len()).rev() {
-        match dataset.read(index, scan.slot()) {
-            Ok(geometry) => {
-                scan.geometry = geometry;
+        match dataset.scan(index) {
+            Ok(scan) => {
                 assert!(scan.azimuth_rad.iter().all(|azimuth| azimuth.is_finite()));
-                assert_eq!(Some(geometry.stamp_ns), dataset.nominal_stamp_ns(index));
+                let stamp_ns = Some(scan.geometry.stamp_ns);
+                assert_eq!(stamp_ns, dataset.nominal_stamp_ns(index));
             }
             Err(error) => refused = Some(error),
         }

@@ -9,7 +9,7 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
 };
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, samples::SensorConfigs};
+use gyre_geometry::{Pose, SparsePoint, UncertainMotion, samples::SensorConfigs};
 use gyre_journal::{
     self as journal, Journal,
     checkpoint::{self, Checkpoint},
@@ -48,10 +48,7 @@ fn edited(file: &[u8], edits: &[Edit], word: impl Fn(&mut [u8], usize, usize, u6
 
 fn pose(seq: u64) -> PoseHeader {
     PoseHeader {
-        item: Item {
-            seq,
-            ..Item::default()
-        },
+        item: Item::numbered(seq),
         ..PoseHeader::default()
     }
 }
@@ -195,17 +192,8 @@ fn slots(file: &[u8]) -> Vec<std::ops::Range<usize>> {
 const KEYFRAMES: usize = 4;
 
 fn keyframe(seq: usize) -> Keyframe {
-    Keyframe {
-        seq: seq as u64,
-        scan: seq as u64,
-        stamp_ns: 0,
-        pose: UncertainMotion::identity(),
-        motion: UncertainMotion::identity(),
-        noise: UncertainMotion::identity().covariance,
-        twist: Twist::default(),
-        path_m: 0.0,
-        points: vec![SparsePoint::default(); 4],
-    }
+    let points = vec![SparsePoint::default(); 4];
+    Keyframe::standing(seq as u64, UncertainMotion::identity(), points)
 }
 
 /// Reads all keyframes, cuts the torn end, and continues.

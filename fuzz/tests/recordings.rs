@@ -8,7 +8,6 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, TextEdit, edit_bytes, edit_text},
 };
-use gyre_geometry::OwnedScan;
 use tempfile::TempDir;
 
 use self::common::{PERIOD_US, START_US, Sweep, write_png, written};
@@ -161,11 +160,9 @@ fn edit_rows(pixels: &mut [u8], width: usize, edits: &[RowEdit]) {
 fn use_recording(root: &Path, options: &DatasetOptions) -> Result<(), Failure> {
     let mut dataset = open(root, options)?;
     let mut refused = None;
-    let mut scan = OwnedScan::with_limits(dataset.limits());
     for index in 0..dataset.len() {
-        match dataset.read(index, scan.slot()) {
-            Ok(geometry) => {
-                scan.geometry = geometry;
+        match dataset.scan(index) {
+            Ok(scan) => {
                 scan.view().check().unwrap();
                 assert!(scan.azimuth_rad.iter().all(|azimuth| azimuth.is_finite()));
             }

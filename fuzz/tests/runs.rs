@@ -3,52 +3,35 @@
 use std::{fs, path::Path, slice};
 
 use bolero::check;
-use bytemuck::{Zeroable, bytes_of};
-use gyre_contract::{GivenAnew, Item, ScanHeader};
+use gyre_contract::{GivenAnew, Item};
 use gyre_datasets::DatasetOptions;
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_geometry::OwnedScan;
-use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingWriter};
+use gyre_recording::{Incoming, LogLine, Recording, RecordingWriter};
 
 use crate::recordings::folder;
 
+#[path = "../../shared/formats/recording/tests/written/mod.rs"]
+mod written;
+
 const SCANS: u64 = 3;
-const START_NS: i64 = 1_549_986_607_000_000_000;
 
 fn scan(seq: u64) -> Incoming {
     let item = Item {
-        seq,
-        scan: seq,
-        stamp_ns: START_NS + seq as i64 * 250_000_000,
         // The radar's source was started again twice before each.
         generation: 2 * seq as u32 + 1,
         numbered_from: seq,
-        ..Item::default()
+        ..written::item(seq)
     };
-    let mut header = ScanHeader {
-        item,
-        azimuths: 4,
-        bins: 10,
-        stride: 10,
-        range_resolution_m: 0.5,
-        clockwise: 1,
-        ..ScanHeader::zeroed()
-    };
-    header.azimuth_stamp_ns[..4].fill(item.stamp_ns);
-    header.azimuth_rad[..4].copy_from_slice(&[0.0, 1.5, 3.0, 4.5]);
     Incoming {
-        topic: "scan",
-        header: bytes_of(&header).to_vec(),
-        payload: (0..40).map(|byte| byte * 5 + seq as u8).collect(),
-        received_ns: START_NS,
         missed: 1,
         skipped: (seq > 0).then_some(GivenAnew {
             generation: 2 * seq as u32,
             first: seq,
         }),
+        ..written::scan(item)
     }
 }
 
@@ -56,15 +39,7 @@ fn scan(seq: u64) -> Incoming {
 fn recording() -> Vec<u8> {
     let folder = folder();
     let path = folder.path().join("run.mcap");
-    let head = Head {
-        id: "a".to_owned(),
-        part: 1,
-        configuration: "[dataset]\nformat = \"radiate\"\n".to_owned(),
-        topics: vec!["scan".to_owned()],
-        scan_bytes: 64,
-        mode: "lossless".to_owned(),
-    };
-    let mut writer = RecordingWriter::create(&path, &head).unwrap();
+    let mut writer = RecordingWriter::create(&path, &written::head("a", 1)).unwrap();
     for seq in 0..SCANS {
         writer.add(&scan(seq)).unwrap();
         writer.flush().unwrap();
@@ -82,11 +57,9 @@ fn use_run(path: &Path) -> Result<(), Failure> {
     let refused = messages.filter_map(Result::err).last();
 
     let mut dataset = gyre_recording::open(path, &DatasetOptions::default())?;
-    let mut scan = OwnedScan::with_limits(dataset.limits());
     // A damaged number of a scan leaves a gap of any length.
-    for index in (dataset.first()..dataset.len()).take(100) {
-        if let Ok(geometry) = dataset.read(index, scan.slot()) {
-            scan.geometry = geometry;
+    for index in dataset.scans().take(100) {
+        if let Ok(scan) = dataset.scan(index) {
             scan.view().check().unwrap();
         }
     }
@@ -100,7 +73,7 @@ fn runs() {
     fs::write(&path, &recording).unwrap();
     use_run(&path).unwrap();
     let dataset = gyre_recording::open(&path, &DatasetOptions::default()).unwrap();
-    assert_eq!(dataset.len(), SCANS as usize);
+    assert_eq!(dataset.scans().count(), SCANS as usize);
     check!().with_type::<Vec<ByteEdit>>().for_each(|edits| {
         let mut file = recording.clone();
         edit_bytes(&mut file, edits);

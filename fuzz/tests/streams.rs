@@ -80,21 +80,9 @@ fn edit_radar(configuration: &mut Configuration, rows: &mut [Row], edits: &[Edit
 /// encoder.
 const HEALTH: [u8; 13] = [0x0a, 7, 0x1d, 0, 0, 0x12, 0x42, 0x28, 3, 0x40, 1, 0x60, 3];
 
-fn radar(bins: u16) -> Configuration {
-    Configuration {
-        azimuth_samples: AZIMUTHS,
-        bin_size: 438,
-        range_in_bins: bins,
-        encoder_size: COUNTS,
-        rotation_mhz: 4000,
-        range_resolution_m: Some(0.04381),
-        ..Configuration::default()
-    }
-}
-
 /// The stream of a radar that turns four times.
 pub fn stream(edits: &[Edit]) -> Vec<u8> {
-    let mut configuration = radar(BINS);
+    let mut configuration = Configuration::usual(AZIMUTHS, BINS);
     let row = |k: u16| Row {
         encoder: k % AZIMUTHS * (COUNTS / AZIMUTHS),
         stamp_ns: START_NS + i64::from(k) * 15_625_000,
@@ -108,20 +96,13 @@ pub fn stream(edits: &[Edit]) -> Vec<u8> {
     let mut bytes = Vec::new();
     write_configuration(&mut bytes, &configuration);
     for row in rows.iter().filter(|row| !row.lost) {
-        let (mut seconds, mut split_seconds) = ClockFormat::default().fields(row.stamp_ns);
+        let mut azimuth = Azimuth::at(row.encoder, row.stamp_ns, ClockFormat::default(), &powers);
         if let Some([s0, s1, s2, s3, p0, p1, p2, p3]) = row.time {
-            (seconds, split_seconds) = ([s0, s1, s2, s3], [p0, p1, p2, p3]);
+            (azimuth.seconds, azimuth.split_seconds) = ([s0, s1, s2, s3], [p0, p1, p2, p3]);
         }
-        let azimuth = Azimuth {
-            sweep_counter: 0,
-            encoder: row.encoder,
-            seconds,
-            split_seconds,
-            powers: match row.wide {
-                true => Powers::Sixteen(&powers),
-                false => Powers::Eight(&powers),
-            },
-        };
+        if row.wide {
+            azimuth.powers = Powers::Sixteen(&powers);
+        }
         write_azimuth(&mut bytes, &azimuth);
         write_keep_alive(&mut bytes);
         write_other(&mut bytes, 40, &HEALTH);
@@ -224,7 +205,7 @@ fn streams() {
 
 /// The datagrams of a radar that turns four times.
 pub fn datagrams() -> Vec<Vec<u8>> {
-    let radar = radar(WIDE_BINS);
+    let radar = Configuration::usual(AZIMUTHS, WIDE_BINS);
     let format = ClockFormat {
         order: ByteOrder::Big,
         ..ClockFormat::default()
@@ -232,14 +213,9 @@ pub fn datagrams() -> Vec<Vec<u8>> {
     let powers: Vec<u8> = (0..WIDE_BINS).map(|bin| (bin * 7) as u8).collect();
     let (mut number, mut sent) = (0, Vec::new());
     for k in 0..4 * AZIMUTHS {
-        let (seconds, split_seconds) = format.fields(START_NS + i64::from(k) * 15_625_000);
-        let azimuth = Azimuth {
-            sweep_counter: 0,
-            encoder: k % AZIMUTHS * (COUNTS / AZIMUTHS),
-            seconds,
-            split_seconds,
-            powers: Powers::Eight(&powers),
-        };
+        let encoder = k % AZIMUTHS * (COUNTS / AZIMUTHS);
+        let stamp_ns = START_NS + i64::from(k) * 15_625_000;
+        let azimuth = Azimuth::at(encoder, stamp_ns, format, &powers);
         let mut send = |datagram: &[u8]| sent.push(datagram.to_vec());
         asterix::write_azimuth(&radar, &azimuth, &mut number, &mut send);
     }

@@ -8,7 +8,7 @@ use std::{
 
 use gyre_transport::run::{SHARED_MEMORY, root_of};
 
-use super::processes;
+use super::{names_in, processes};
 
 /// The run's place in shared memory, which is named after its results.
 pub fn root(out: &Path) -> PathBuf {
@@ -33,7 +33,7 @@ pub fn assert_nothing_left_of(root: &Path) {
         !root.exists(),
         "{} is still there: {:?}",
         root.display(),
-        files_in(root)
+        names_in(root)
     );
     let lock = root.with_extension("lock");
     assert!(!lock.exists(), "{} is still there", lock.display());
@@ -73,7 +73,7 @@ pub fn remove(out: &Path) {
 
 fn shared_memory_of(root: &Path) -> Vec<String> {
     let prefix = format!("{}_", root.file_name().unwrap().to_string_lossy());
-    files_in(Path::new(SHARED_MEMORY))
+    names_in(Path::new(SHARED_MEMORY))
         .into_iter()
         .filter(|name| name.starts_with(&prefix))
         .collect()
@@ -83,17 +83,10 @@ fn is_of(name: &str, root: &Path) -> bool {
     name.contains(&*root.file_name().unwrap().to_string_lossy())
 }
 
-fn files_in(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .collect()
-}
-
 fn names_below(folder: &Path) -> Vec<String> {
     let below = |name: String| {
         let deeper = names_below(&folder.join(&name));
         std::iter::once(name).chain(deeper)
     };
-    files_in(folder).into_iter().flat_map(below).collect()
+    names_in(folder).into_iter().flat_map(below).collect()
 }

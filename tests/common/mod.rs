@@ -35,9 +35,9 @@ pub use browser::Browser;
 pub use ended::Ended;
 pub use leftovers::{assert_nothing_left, assert_nothing_left_of};
 pub use other_user::OtherUser;
-pub use processes::{Pid, cpu_time, send};
+pub use processes::{Pid, send};
 pub use running::{Running, poses_of};
-pub use server::Server;
+pub use server::{Server, asked};
 pub use shared::Shared;
 pub use spawned::Spawned;
 pub use watch::{Watch, Watched};
@@ -73,6 +73,13 @@ pub fn python() -> String {
     env::var("GYRE_PYTHON").unwrap_or_else(|_| "python3".to_owned())
 }
 
+/// A script of `tests/` for this Python.
+pub fn script(path: &str) -> Command {
+    let mut command = Command::new(python());
+    command.arg(Path::new(crate::PROJECT).join("tests").join(path));
+    command
+}
+
 pub fn gyre() -> Command {
     Command::new(crate::PROGRAM)
 }
@@ -88,10 +95,28 @@ macro_rules! finished {
 }
 pub(crate) use finished;
 
+/// The paths of the files and folders in a folder, sorted; none where it is missing.
+pub fn entries_of(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    paths.sort();
+    paths
+}
+
+/// Their names.
+pub fn names_in(folder: &Path) -> Vec<String> {
+    let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+    entries_of(folder).iter().map(name).collect()
+}
+
+pub fn works(command: &[&str]) -> bool {
+    let output = Command::new(command[0]).args(&command[1..]).output();
+    output.is_ok_and(|output| output.status.success())
+}
+
 /// Returns whether a command works here; prints why a test is skipped.
 pub fn can(command: &[&str]) -> bool {
-    let output = Command::new(command[0]).args(&command[1..]).output();
-    let can = output.is_ok_and(|output| output.status.success());
+    let can = works(command);
     if !can {
         println!("skips what needs `{}`", command.join(" "));
     }
@@ -183,12 +208,7 @@ pub struct Run {
 impl Run {
     /// A run of the small recording, as fast as it goes.
     pub fn of_recording() -> Self {
-        Self::of_recording_named(recording::small().to_str().unwrap())
-    }
-
-    /// The same where the recording goes by another name.
-    pub fn of_recording_named(name: &str) -> Self {
-        Self::small().option(name)
+        Self::small().data(recording::small())
     }
 
     /// A run of small rasters whose recording is still to be named.
@@ -245,9 +265,16 @@ impl Run {
         self.argument("--set", sentence)
     }
 
+    /// Sets several keys, whose sentences spaces part.
+    pub fn sets(self, sentences: &str) -> Self {
+        sentences.split_whitespace().fold(self, Self::set)
+    }
+
     pub fn masked_by(self, card: &Path) -> Self {
-        self.set("masking.kind=learned")
-            .set(&format!("masking.model='{}'", card.display()))
+        self.sets(&format!(
+            "masking.kind=learned masking.model='{}'",
+            card.display()
+        ))
     }
 
     pub fn into(mut self, out: &Path) -> Self {
@@ -338,6 +365,21 @@ impl Run {
 
     pub fn summary(&self) -> Value {
         serde_json::from_str(&self.result("summary.json")).unwrap()
+    }
+
+    /// A number of the summary; its key may be a path of keys.
+    pub fn count(&self, key: &str) -> u64 {
+        let summary = self.summary();
+        let count = summary.pointer(&format!("/{key}"));
+        let count = count.and_then(Value::as_u64);
+        count.unwrap_or_else(|| panic!("no {key} in {summary:#}"))
+    }
+
+    /// Asserts numbers of the summary: `key=number`, with spaces between.
+    pub fn assert_counts(&self, expected: &str) {
+        for (key, count) in expected.split(' ').filter_map(|it| it.split_once('=')) {
+            assert_eq!(self.count(key).to_string(), count, "{key}");
+        }
     }
 
     pub fn result(&self, name: impl AsRef<Path>) -> String {

@@ -6,9 +6,9 @@ use std::{
     fs,
     os::unix::ffi::OsStrExt,
     path::{Path, PathBuf},
-    time::Duration,
 };
 
+use gyre_client::ProcessStat;
 use gyre_contract::{FollowerId, StageId};
 use rustix::process::{Signal, kill_process};
 
@@ -21,13 +21,6 @@ pub fn send(pid: Pid, signal: Signal) {
     }
 }
 
-pub fn cpu_time(pid: Pid) -> Duration {
-    let fields = stat(pid).unwrap();
-    // utime and stime, in hundredths of a second.
-    let ticks = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
-    Duration::from_millis(ticks * 10)
-}
-
 /// The living stages and followers among a supervisor's children, by name.
 pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
     children_of(supervisor)
@@ -36,9 +29,8 @@ pub fn stages_of(supervisor: Pid) -> BTreeMap<String, Pid> {
 }
 
 pub fn of_run(root: &Path) -> Vec<Pid> {
-    pids()
-        .filter(|pid| run_of(*pid).is_some_and(|run| run == root))
-        .collect()
+    let of_run = |pid: &Pid| run_of(*pid).is_some_and(|run| run == root);
+    ProcessStat::all().map(|it| it.pid).filter(of_run).collect()
 }
 
 /// The root of the run that the environment of a process names.
@@ -54,7 +46,7 @@ pub fn child_with(supervisor: Pid, word: &str) -> Option<Pid> {
 }
 
 pub fn is_alive(pid: Pid) -> bool {
-    stat(pid).is_some_and(|fields| !["Z", "X"].contains(&fields[0].as_str()))
+    ProcessStat::of(pid).is_some_and(|process| !process.has_ended)
 }
 
 pub fn parent_of(pid: Pid) -> Option<Pid> {
@@ -62,12 +54,9 @@ pub fn parent_of(pid: Pid) -> Option<Pid> {
 }
 
 fn children_of(supervisor: Pid) -> impl Iterator<Item = Pid> {
-    pids().filter(move |pid| parent_of(*pid) == Some(supervisor) && is_alive(*pid))
-}
-
-fn pids() -> impl Iterator<Item = Pid> {
-    let entries = fs::read_dir("/proc").unwrap();
-    entries.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok())
+    let living = ProcessStat::all().filter(|process| !process.has_ended);
+    let pids = living.map(|process| process.pid);
+    pids.filter(move |pid| parent_of(*pid) == Some(supervisor))
 }
 
 /// The fields of a process behind its name: state, parent and others.
@@ -75,6 +64,14 @@ pub fn stat(pid: Pid) -> Option<Vec<String>> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     let (_, fields) = stat.rsplit_once(") ")?;
     Some(fields.split(' ').map(str::to_owned).collect())
+}
+
+/// What the system says of a process in the line of `/proc/PID/status` with this name.
+pub fn status(pid: Pid, name: &str) -> Option<String> {
+    let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    let mut lines = status.lines().filter_map(|line| line.split_once(':'));
+    let (_, value) = lines.find(|(named, _)| *named == name)?;
+    Some(value.trim().to_owned())
 }
 
 fn words(pid: Pid) -> Vec<String> {

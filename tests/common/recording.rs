@@ -13,7 +13,7 @@ use std::{
 use gyre_simulator::{SimulationConfig, write_dataset};
 use tempfile::TempDir;
 
-use super::Run;
+use super::{Run, entries_of};
 
 pub const SCANS: usize = 24;
 /// A rate at which the small recording's six seconds take one: slow enough to disturb the middle.
@@ -121,8 +121,7 @@ fn link(recording: &Path, folder: &Path, keep: impl Fn(usize) -> bool) {
 }
 
 fn copy_files(from: &Path, to: &Path) {
-    for entry in fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
+    for path in entries_of(from) {
         let copy = to.join(path.file_name().unwrap());
         if path.is_dir() {
             fs::create_dir(&copy).unwrap();
@@ -139,21 +138,13 @@ fn is_image(path: &Path) -> bool {
 
 /// The images of a recording in the order of their times; none before the first is complete.
 pub fn images(recording: &Path) -> Vec<PathBuf> {
-    let is_folder_of_images = |folder: &PathBuf| files(folder).iter().any(|file| is_image(file));
-    let Some(folder) = files(recording).into_iter().find(is_folder_of_images) else {
-        return Vec::new();
+    let images_in = |folder: PathBuf| {
+        let mut files = entries_of(&folder);
+        files.retain(|file| is_image(file));
+        (!files.is_empty()).then_some(files)
     };
-    let mut images: Vec<PathBuf> = files(&folder)
-        .into_iter()
-        .filter(|file| is_image(file))
-        .collect();
-    images.sort();
-    images
-}
-
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten();
-    entries.map(|entry| entry.unwrap().path()).collect()
+    let folders = entries_of(recording).into_iter();
+    folders.filter_map(images_in).next().unwrap_or_default()
 }
 
 pub fn truncate(image: &Path, bytes: usize) {

@@ -9,6 +9,15 @@ use rustix::process::Signal;
 
 use super::{Pid, Run, gyre, spawned::Spawned};
 
+/// Asks a port of this machine for a path with these headers.
+pub fn asked(port: &str, path: &str, headers: &[&str]) -> TcpStream {
+    let mut connection = TcpStream::connect(("127.0.0.1", port.parse().unwrap())).unwrap();
+    let headers = headers.iter().map(|header| format!("{header}\r\n"));
+    let request = format!("GET {path} HTTP/1.1\r\n{}\r\n", headers.collect::<String>());
+    connection.write_all(request.as_bytes()).unwrap();
+    connection
+}
+
 pub struct Server {
     process: Spawned,
     pub address: String,
@@ -53,26 +62,15 @@ impl Server {
     /// Asks for a path as a browser on this machine does, with other headers, and returns the whole
     /// answer.
     pub fn get(&self, path: &str, headers: &[&str]) -> String {
-        let port = self
-            .address
-            .split('/')
-            .nth(2)
-            .and_then(|host| host.rsplit_once(':'));
-        let port: u16 = port.unwrap().1.parse().unwrap();
-        let mut connection = TcpStream::connect(("127.0.0.1", port)).unwrap();
+        let host = self.address.split('/').nth(2).unwrap();
+        let (_, port) = host.rsplit_once(':').unwrap();
+        let host = format!("Host: 127.0.0.1:{port}");
         let has_host = headers.iter().any(|header| header.starts_with("Host:"));
-        let host = if has_host {
-            String::new()
-        } else {
-            format!("Host: 127.0.0.1:{port}\r\n")
-        };
-        let headers: String = headers
-            .iter()
-            .map(|header| format!("{header}\r\n"))
-            .collect();
-        let request = format!("GET {path} HTTP/1.1\r\n{host}{headers}Connection: close\r\n\r\n");
-        connection.write_all(request.as_bytes()).unwrap();
+        let mut all = vec!["Connection: close"];
+        all.extend((!has_host).then_some(host.as_str()));
+        all.extend(headers);
         let mut answer = String::new();
+        let mut connection = asked(port, path, &all);
         connection.read_to_string(&mut answer).unwrap();
         answer
     }

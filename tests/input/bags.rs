@@ -4,13 +4,12 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 use serde_json::Value;
 
 use crate::{
-    common::{Ended, Run, finished, odometry, python, recording, recording::with_constants},
+    common::{Ended, Run, finished, odometry, recording, recording::with_constants, script},
     live::radar::whole,
     reach::python_has,
 };
@@ -36,9 +35,8 @@ fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
     if !python_has("rosbags, numpy") {
         return None;
     }
-    let script = Path::new(crate::PROJECT).join("tests/input/bags/check.py");
-    let mut command = Command::new(python());
-    command.arg(script).arg(bag).arg(out).args(turned);
+    let mut command = script("input/bags/check.py");
+    command.arg(bag).arg(out).args(turned);
     let ended = Ended::of(command);
     ended.succeeded();
     Some(serde_json::from_str(&ended.stdout).unwrap())
@@ -61,8 +59,7 @@ fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
     let whole = whole(recording::SCANS);
     let run = Run::small().data(whole.path()).set("slam.kind=graph");
     // Some motions are predicted.
-    let run = run.set("refinement.min_overlap=0.98");
-    let run = run.set("refinement.firm_overlap=0.98");
+    let run = run.sets("refinement.min_overlap=0.98 refinement.firm_overlap=0.98");
     run.finish()
         .failed_with(&["hardly measured this trajectory"]);
     let motions = odometry::rows(&run.odometry()).len();
@@ -93,10 +90,7 @@ fn the_objects_of_a_run_and_of_its_recording_are_those_of_the_results_to_another
     let run = Run::small().data(recording::around_a_block());
     let recorded = bag(&run, "drive.mcap");
     let run = run.argument("--record", recorded.to_str().unwrap());
-    let run = run
-        .set("run.window=32")
-        .set("objects.kind=tracks")
-        .rate("20");
+    let run = run.sets("run.window=32 objects.kind=tracks").rate("20");
     run.complete();
     for (source, name) in [(run.out(), "of_run"), (&recorded, "of_recording.mcap")] {
         let path = bag(&run, name);
@@ -135,8 +129,7 @@ fn a_bag_without_its_end_gives_results_but_no_success() {
     let path = bag(&run, "bag.mcap");
     let exported = export(run.out(), &path, &[]);
     // A few rows of the recording are not measured, as in real ones.
-    let says = exported.succeeded().stderr.contains("interpolated rows: ");
-    assert!(says, "{}", exported.stderr);
+    exported.succeeded().says("interpolated rows: ");
     let bytes = fs::read(&path).unwrap();
     // Zstandard's signature begins the content of each chunk.
     let magic = [0x28, 0xb5, 0x2f, 0xfd];

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 /// A whole recording, and a run of it at a rate.
 fn whole(rate: &str) -> (TempDir, Run) {
     let recording = recording::copy(recording::SCANS);
-    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    let run = Run::small().data(recording.path());
     (recording, run.rate(rate))
 }
 
@@ -30,9 +30,7 @@ fn bring_back(recording: &Path) {
 /// Asserts that every scan was played and is in the result.
 fn assert_whole(run: &Run) {
     assert_eq!(run.odometry(), undisturbed());
-    let summary = run.summary();
-    assert_eq!(summary["published"], recording::SCANS);
-    assert_eq!(summary["unreadable"], 0);
+    run.assert_counts("published=24 unreadable=0");
 }
 
 #[test]
@@ -66,9 +64,7 @@ fn a_source_that_waits_for_its_input_has_not_stalled() {
     take_away(recording.path());
     thread::sleep(Duration::from_secs(4));
     bring_back(recording.path());
-    let ended = running.finish();
-    ended.succeeded();
-    assert!(!ended.stderr.contains("restarted"), "{}", ended.stderr);
+    running.finish().succeeded().does_not_say("restarted");
     assert_whole(&run);
 }
 
@@ -88,15 +84,14 @@ fn a_folder_that_stays_away_ends_the_run_and_the_same_command_goes_on() {
     bring_back(recording.path());
     run.complete();
     assert_whole(&run);
-    assert!(run.summary()["resumed_after"].as_u64() >= Some(MIDDLE as u64));
+    assert!(run.count("resumed_after") >= MIDDLE as u64);
 }
 
 #[test]
 fn a_run_that_waits_for_its_input_can_be_interrupted() {
     let (recording, run) = whole(MODERATE);
     // A time longer than any run is no limit.
-    let run = run.set("source.retry_s=1e300");
-    let run = run.set("run.stall_timeout_s=1e300");
+    let run = run.sets("source.retry_s=1e300 run.stall_timeout_s=1e300");
     let running = run.started(MIDDLE);
     take_away(recording.path());
     thread::sleep(Duration::from_millis(300));
@@ -115,13 +110,13 @@ fn a_live_run_whose_folder_is_away_for_a_moment_accounts_for_every_scan() {
     thread::sleep(Duration::from_millis(600));
     bring_back(recording.path());
     running.finish().succeeded();
-    let summary = run.summary();
-    let count = |key: &str| summary[key].as_u64().unwrap();
-    assert_eq!(count("unreadable"), 0);
-    assert_eq!(count("published"), recording::SCANS as u64);
-    assert_eq!(count("processed") + count("dropped"), count("published"));
+    run.assert_counts("published=24 unreadable=0");
     // A sensor does not wait for the disk.
-    assert!(count("dropped") > 0, "{summary}");
+    let [processed, dropped] = ["processed", "dropped"].map(|key| run.count(key));
+    assert!(
+        processed + dropped == 24 && dropped > 0,
+        "{processed} {dropped}"
+    );
 }
 
 #[test]
@@ -147,7 +142,7 @@ fn damaged(scans: impl IntoIterator<Item = usize>) -> (TempDir, Run) {
     for scan in scans {
         recording::truncate(&images[scan], 100_000);
     }
-    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    let run = Run::small().data(recording.path());
     (recording, run)
 }
 
@@ -162,9 +157,8 @@ fn many_damaged_scans_in_a_row_end_the_run_and_a_higher_limit_continues_it() {
         "the same command resumes",
     ]);
     run.complete();
-    let summary = run.summary();
-    assert_eq!(summary["unreadable"], 3);
-    assert!(summary["resumed_after"].as_u64() > Some(0), "{summary}");
+    run.assert_counts("unreadable=3");
+    assert!(run.count("resumed_after") > 0);
 }
 
 #[test]
@@ -184,6 +178,5 @@ fn scans_are_numbered_as_in_the_recording() {
     let rows = crate::common::odometry::rows(&run.odometry());
     assert_eq!((rows[0].scan, rows[0].previous_scan), (8, 7));
     assert_eq!((rows[1].scan, rows[1].previous_scan), (10, 8));
-    let summary = run.summary();
-    assert_eq!([&summary["published"], &summary["unreadable"]], [16, 1]);
+    run.assert_counts("published=16 unreadable=1");
 }

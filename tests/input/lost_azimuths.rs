@@ -21,12 +21,7 @@ fn scans(recording: &Path) -> Vec<OwnedScan> {
 
 fn read_all(dataset: &mut dyn Dataset) -> Vec<OwnedScan> {
     let indices = 0..dataset.len();
-    let read = |index| {
-        let mut scan = OwnedScan::with_limits(dataset.limits());
-        scan.geometry = dataset.read(index, scan.slot()).unwrap();
-        scan
-    };
-    indices.map(read).collect()
+    indices.map(|index| dataset.scan(index).unwrap()).collect()
 }
 
 fn stale(scans: &[OwnedScan]) -> Vec<usize> {

@@ -63,8 +63,7 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
         "slam.kind=graph slam.map='nowhere'|nowhere is not a map",
     ] {
         let (settings, words) = case.split_once('|').unwrap();
-        let settings = settings.split(' ');
-        let run = settings.fold(Run::of_recording(), Run::set);
+        let run = Run::of_recording().sets(settings);
         refused(run, &words.split('|').collect::<Vec<_>>());
     }
 }
@@ -87,16 +86,7 @@ fn skips(bad: usize, reason: &str, damage: impl FnOnce(&Path)) {
     damage(&recording::images(recording.path())[bad]);
     let run = run_of(recording.path());
     run.finish().succeeded();
-    let summary = run.summary();
-    for (key, count) in [
-        ("published", 7),
-        ("processed", 7),
-        ("unreadable", 1),
-        ("dropped", 0),
-        ("breaks", 0),
-    ] {
-        assert_eq!(summary[key], count, "{key}");
-    }
+    run.assert_counts("published=7 processed=7 unreadable=1 dropped=0 breaks=0");
     let rows = odometry::rows(&run.odometry());
     odometry::assert_unbroken(&rows);
     assert_eq!(rows.len(), 6);

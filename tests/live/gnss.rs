@@ -27,13 +27,13 @@ pub fn drive() -> TempDir {
 
 /// A run of a live radar and a receiver that sends to this address.
 fn receiving(radar: &Radar, address: &str, scans: usize) -> Run {
-    with_graph(radar.run(scans), address).set("gnss.kind=udp")
+    let run = with_graph(radar.run(scans)).set("gnss.kind=udp");
+    run.set(&format!("gnss.listen='{address}'"))
 }
 
-/// A run whose corrected trajectory takes fixes at this address.
-pub fn with_graph(run: Run, address: &str) -> Run {
-    let run = run.set("slam.kind=graph").set("run.window=32");
-    with_antenna(run.set(&format!("gnss.listen='{address}'")))
+/// A run whose trajectory is corrected by fixes.
+pub fn with_graph(run: Run) -> Run {
+    with_antenna(run.sets("slam.kind=graph run.window=32"))
 }
 
 /// The messages that the receiver sends during the drive.
@@ -60,10 +60,14 @@ fn fixes_of_a_live_receiver_correct_the_trajectory_and_the_recording_replays_to_
     let address = address(3);
     let radar = Radar::playing(drive.path(), &[]);
     let run = recorded(&receiving(&radar, &address, SCANS));
-    let receiver = sending(lines(), address, 200);
-    let live = run.complete();
+    let receiver = sending(lines(), address, 700);
+    // Who reads the fixes is killed while they arrive.
+    let mut running = run.started(SCANS / 3);
+    running.kill("trajectory");
+    let live = running.complete();
     receiver.join().unwrap();
     assert_eq!(run.summary()["dropped"], 0);
+    assert_eq!(run.summary()["restarts"]["trajectory"], 1);
     let without = Run::small().data(drive.path()).set("slam.kind=graph");
     assert_eq!(live, without.complete());
     let corrected = |run: &Run| run.result("trajectory_slam.tum");
@@ -79,6 +83,7 @@ fn fixes_of_a_live_receiver_correct_the_trajectory_and_the_recording_replays_to_
     for fault in faults {
         assert_eq!(gnss["faults"][fault], 1, "{fault}: {gnss}");
     }
+    assert_eq!(gnss["faults"]["lost"], 0, "{gnss}");
     assert!(gnss["used"].as_u64().unwrap() > 20, "{gnss}");
     assert_replays(&run);
 }

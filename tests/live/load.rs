@@ -9,7 +9,6 @@ use crate::{
     method::learned_masks::{TWO_SCANS, card},
 };
 use rustix::process::Signal;
-use serde_json::Value;
 
 /// The recording's period is 250 ms; played at this rate it is 60 ms and a bit.
 const RATE: &str = "4";
@@ -22,15 +21,16 @@ fn live() -> Run {
 }
 
 /// Asserts that each scan is where it belongs: played, and then either in the chain or dropped.
-fn assert_exact(summary: &Value, rows: &[ChainRow]) {
-    let count = |key: &str| summary[key].as_u64().unwrap();
-    assert_eq!(count("published"), recording::SCANS as u64, "{summary}");
-    assert_eq!(count("unreadable"), 0);
+fn assert_exact(run: &Run, rows: &[ChainRow]) {
+    run.assert_counts("published=24 unreadable=0");
     // A motion has a row, and each chain starts with a scan that has none.
-    let chains = count("breaks") + 1;
-    assert_eq!(count("processed"), rows.len() as u64 + chains, "{summary}");
-    assert_eq!(count("processed") + count("dropped"), count("published"));
-    assert!(count("dropped") > 0);
+    let chains = run.count("breaks") + 1;
+    let [processed, dropped] = ["processed", "dropped"].map(|key| run.count(key));
+    assert_eq!(processed, rows.len() as u64 + chains);
+    assert!(
+        processed + dropped == 24 && dropped > 0,
+        "{processed} {dropped}"
+    );
     assert_eq!(rows.last().unwrap().scan, recording::SCANS as u64 - 1);
 }
 
@@ -46,14 +46,14 @@ fn stepped_over(rows: &[ChainRow]) -> u64 {
 fn slow_masking_drops_scans_and_the_chain_does_not_break() {
     let run = live();
     let rows = odometry::rows(&run.complete());
-    let summary = run.summary();
-    assert_exact(&summary, &rows);
+    assert_exact(&run, &rows);
     odometry::assert_unbroken(&rows);
-    assert_eq!(summary["breaks"], 0);
-    assert_eq!(summary["dropped"], stepped_over(&rows));
-    let stages = &summary["stages"];
-    assert_eq!(stages["radar-replay"]["processed"], summary["published"]);
-    assert_eq!(stages["masking"]["processed"], summary["processed"]);
+    run.assert_counts("breaks=0 stages/radar-replay/processed=24");
+    assert_eq!(run.count("dropped"), stepped_over(&rows));
+    assert_eq!(
+        run.count("stages/masking/processed"),
+        run.count("processed")
+    );
 }
 
 /// Behind masking nothing is dropped, so that the chain does not break there. A source that stops
@@ -88,8 +88,8 @@ fn any_process_can_die_and_every_scan_is_accounted_for() {
         for stage in restarted {
             assert_eq!(summary["restarts"][*stage], 1, "{killed:?}");
         }
-        assert_exact(&summary, &rows);
-        assert!(summary["breaks"].as_u64() <= Some(1), "{summary}");
+        assert_exact(&run, &rows);
+        assert!(run.count("breaks") <= 1, "{summary}");
         if !restarted
             .iter()
             .any(|it| ["masking", "radar-replay"].contains(it))

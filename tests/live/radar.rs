@@ -2,10 +2,9 @@
 //! live.
 
 use std::{
-    io::{BufRead, BufReader, Read},
     net::{TcpListener, UdpSocket},
     path::Path,
-    process::{self, Child, Stdio},
+    process,
     sync::mpsc::{self, RecvTimeoutError},
     thread,
     time::Duration,
@@ -15,7 +14,7 @@ use rustix::process::Signal;
 use tempfile::TempDir;
 
 use crate::{
-    common::{Ended, Run, Watch, gyre, odometry, recording},
+    common::{Ended, Run, Spawned, Watch, gyre, odometry, recording},
     operate::commands::ask,
 };
 
@@ -24,8 +23,9 @@ const RATE: &str = "1.5";
 
 /// A radar on a port of its own, which is switched off when it is dropped.
 pub(crate) struct Radar {
-    server: Child,
+    server: Spawned,
     pub address: String,
+    _folder: TempDir,
 }
 
 impl Radar {
@@ -46,13 +46,17 @@ impl Radar {
             command.args(["--rate", RATE]);
         }
         command.arg(recording).args(arguments);
-        command.stderr(Stdio::piped()).stdout(Stdio::piped());
-        let mut server = command.spawn().unwrap();
-        let mut said = String::new();
-        let mut words = BufReader::new(server.stderr.take().unwrap());
-        words.read_line(&mut said).unwrap();
-        let address = said.trim().rsplit(' ').next().unwrap().to_owned();
-        Self { server, address }
+        let folder = TempDir::new().unwrap();
+        let server = Spawned::new(command, folder.path().join("said"));
+        let address = server.until(|said| {
+            let (line, _) = said.split_once('\n')?;
+            line.rsplit(' ').next().map(str::to_owned)
+        });
+        Self {
+            server,
+            address,
+            _folder: folder,
+        }
     }
 
     pub fn run(&self, scans: usize) -> Run {
@@ -61,10 +65,10 @@ impl Radar {
 
     /// Waits until the radar has played all, and returns its report of played and lost azimuths.
     pub fn played(&mut self) -> Played {
-        let mut said = String::new();
-        let mut words = self.server.stdout.take().unwrap();
-        words.read_to_string(&mut said).unwrap();
-        let numbers = said.split(|c: char| !c.is_ascii_digit());
+        self.server.wait();
+        let said = self.server.said();
+        let report = said.lines().last().unwrap();
+        let numbers = report.split(|c: char| !c.is_ascii_digit());
         let mut numbers = numbers.filter_map(|number| number.parse().ok());
         let mut next = || numbers.next().unwrap_or_else(|| panic!("{said}"));
         Played {
@@ -108,13 +112,6 @@ pub(crate) fn complete(drive: TempDir) -> TempDir {
     drive
 }
 
-impl Drop for Radar {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
-
 #[test]
 fn a_radar_gives_the_motions_of_its_recording() {
     let scans = recording::SCANS / 2;
@@ -124,9 +121,7 @@ fn a_radar_gives_the_motions_of_its_recording() {
         let radar = Radar::playing(whole.path(), clock);
         let run = radar.run(scans);
         let live = run.complete();
-        assert_eq!(run.summary()["dropped"], 0);
-        let source = &run.summary()["stages"]["radar-replay"];
-        assert_eq!(source["missing_azimuths"], 0);
+        run.assert_counts("dropped=0 stages/radar-replay/missing_azimuths=0");
         assert!(live == recorded, "{clock:?}:\n{live}\n{recorded}");
     }
 }
@@ -164,10 +159,8 @@ fn datagrams_give_the_motions_of_the_recording() {
     let radar = Radar::sending(&group(1), whole.path(), &arguments);
     let run = radar.received(scans);
     let live = run.complete();
-    let source = &run.summary()["stages"]["radar-replay"];
-    assert_eq!(source["missing_azimuths"], 0, "{source}");
-    assert_eq!(source["damaged_messages"], 0, "{source}");
-    assert_eq!(run.summary()["dropped"], 0);
+    run.assert_counts("dropped=0 stages/radar-replay/missing_azimuths=0");
+    run.assert_counts("stages/radar-replay/damaged_messages=0");
     // On a busy machine the radar may have begun before the run.
     let all = Run::small().data(whole.path()).complete();
     let stamps = |csv| odometry::columns(csv, &["stamp_ns", "previous_scan"]);
@@ -175,8 +168,7 @@ fn datagrams_give_the_motions_of_the_recording() {
     let all = stamps(&all);
     let first = &all.iter().find(|row| row[0] == *begun).unwrap()[1];
     let recorded = Run::small().data(whole.path());
-    let recorded = recorded.set(&format!("source.first={first}"));
-    let recorded = recorded.set(&format!("source.scans={scans}"));
+    let recorded = recorded.sets(&format!("source.first={first} source.scans={scans}"));
     assert_eq!(motions(&live), motions(&recorded.complete()));
 }
 
@@ -206,9 +198,8 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
     running.await_poses(5).signal(Signal::INT);
     running.finish();
     run.complete();
-    let summary = run.summary();
-    assert_eq!(summary["published"], 20);
-    assert_eq!(summary["breaks"], 1, "nothing is known of the time between");
+    // Nothing is known of the time between.
+    run.assert_counts("published=20 breaks=1");
 }
 
 #[test]

@@ -8,9 +8,8 @@ use std::{
     time::Duration,
 };
 
-use gyre_colossus::{Azimuth, Configuration, Powers, asterix, write_keep_alive};
+use gyre_colossus::{Azimuth, ClockFormat, Configuration, asterix, write_keep_alive};
 use rustix::process::Signal;
-use serde_json::Value;
 
 use crate::{
     common::{Run, Running, odometry, recording},
@@ -19,7 +18,7 @@ use crate::{
 };
 
 /// Ends a run of a radar that has ended, with a pose of each scan that it has published.
-fn interrupt(run: &Run, running: Running) -> Value {
+fn interrupt(run: &Run, running: Running) {
     // Waits for datagrams in flight.
     thread::sleep(Duration::from_millis(500));
     await_status(run, "a pose of each scan", |status| {
@@ -28,25 +27,24 @@ fn interrupt(run: &Run, running: Running) -> Value {
     });
     running.signal(Signal::INT);
     running.finish();
-    run.summary()
 }
 
-fn count(summary: &Value, key: &str) -> u64 {
-    summary["stages"]["radar-replay"][key].as_u64().unwrap()
+/// A count of the source.
+fn count(run: &Run, key: &str) -> u64 {
+    run.count(&format!("stages/radar-replay/{key}"))
 }
 
 /// Every scan that was played is published or counted, and no more azimuths are missing than were
 /// lost, but for those that were on their way when a connection ended.
-fn assert_all_counted(summary: &Value, played: &Played) {
-    let published = summary["published"].as_u64().unwrap();
-    let left_out = count(summary, "scans_left_out");
+fn assert_all_counted(run: &Run, played: &Played) {
+    let (published, left_out) = (run.count("published"), count(run, "scans_left_out"));
     assert_eq!(
         published + left_out,
         played.scans,
         "{played:?}: {published} published, {left_out} left out, {}",
-        summary["stages"]["radar-replay"]
+        run.summary()["stages"]["radar-replay"]
     );
-    let missing = count(summary, "missing_azimuths");
+    let missing = count(run, "missing_azimuths");
     // Azimuths of dropped scans are not missing from any scan.
     let of_scans = played.lost_azimuths.saturating_sub(missing);
     assert!(
@@ -64,13 +62,13 @@ fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_d
     let mut running = run.start();
     running.await_poses(6).kill("radar-replay");
     let played = radar.played();
-    let summary = interrupt(&run, running);
-    assert_eq!(summary["restarts"]["radar-replay"], 1);
-    assert_all_counted(&summary, &played);
+    interrupt(&run, running);
+    run.assert_counts("restarts/radar-replay=1");
+    assert_all_counted(&run, &played);
     // The counter includes the killed process: three resets come after it.
-    assert!(count(&summary, "reconnections") > played.resets.min(3));
-    assert!(count(&summary, "damaged_messages") >= 1);
-    assert!(count(&summary, "scans_left_out") >= played.resets);
+    assert!(count(&run, "reconnections") > played.resets.min(3));
+    assert!(count(&run, "damaged_messages") >= 1);
+    assert!(count(&run, "scans_left_out") >= played.resets);
     odometry::assert_unbroken(&odometry::rows(&run.odometry()));
 }
 
@@ -146,9 +144,7 @@ fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
         assert!(running.poses() == 0, "it was never said");
     }
     running.finish().succeeded();
-    let summary = run.summary();
-    assert_eq!(summary["published"], 12);
-    assert_eq!(count(&summary, "reconnections"), 4);
+    run.assert_counts("published=12 stages/radar-replay/reconnections=4");
     let log = run.result("log.jsonl");
     for words in ["it does not speak Colossus", "it sent no azimuth for 1s"] {
         assert!(log.contains(words), "{log}");
@@ -164,34 +160,19 @@ fn datagrams_of_others_are_passed_over_and_counted() {
     let options = ["--repeat", "--rate", "1"];
     let _other = Radar::to(&["--udp", &to], recording::small(), &options);
     let forger = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let large = Configuration {
-        azimuth_samples: 400,
-        bin_size: 438,
-        range_in_bins: 60_000,
-        encoder_size: 5600,
-        rotation_mhz: 4000,
-        ..Configuration::default()
-    };
+    let large = Configuration::usual(400, 60_000);
+    let azimuth = Azimuth::at(14, 0, ClockFormat::default(), &[9; 4]);
     let mut number = 0;
     while !running.is_over() {
-        let azimuth = Azimuth {
-            sweep_counter: 0,
-            encoder: 14,
-            seconds: [0; 4],
-            split_seconds: [0; 4],
-            powers: Powers::Eight(&[9; 4]),
-        };
         asterix::write_azimuth(&large, &azimuth, &mut number, &mut |datagram| {
             forger.send_to(datagram, &to).unwrap();
         });
         thread::sleep(Duration::from_millis(20));
     }
     running.finish().succeeded();
-    let summary = run.summary();
-    assert_eq!(summary["published"], 12);
-    assert_eq!(count(&summary, "reconnections"), 0);
+    run.assert_counts("published=12 stages/radar-replay/reconnections=0");
     // Some of each: a scan of the other, and one datagram in 20 ms.
-    assert!(count(&summary, "foreign_messages") > 100);
+    assert!(count(&run, "foreign_messages") > 100);
     assert!(run.result("log.jsonl").contains("give each radar a group"));
 }
 

@@ -4,7 +4,6 @@ use std::{collections::BTreeSet, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_contract::{PoseHeader, flag};
-use gyre_geometry::OwnedScan;
 use gyre_journal as journal;
 use gyre_matching::odometry::{Odometry, OdometryConfig, Outcome, Registered};
 
@@ -20,15 +19,13 @@ fn register_all(run: &Run) -> Vec<Registered> {
     assert_eq!(config, configuration.odometry);
     let played = gyre_configuration::open(&configuration).unwrap();
     let (mut dataset, samples) = (played.dataset, played.samples);
-    let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config).unwrap();
     let scans = configuration.source.played(dataset.scans());
     scans
         .map(|index| {
-            scan.geometry = dataset.read(index, scan.slot()).unwrap();
-            let scan = scan.view();
-            let samples = samples.of(dataset.as_ref(), scan.span_ns());
-            odometry.register(&scan, &samples).unwrap()
+            let scan = dataset.scan(index).unwrap();
+            let samples = samples.of(dataset.as_ref(), scan.view().span_ns());
+            odometry.register(&scan.view(), &samples).unwrap()
         })
         .collect()
 }
@@ -69,9 +66,8 @@ pub fn configuration(name: &str) -> Run {
 
 #[test]
 fn on_the_demo() {
-    let run = Run::of_demo()
-        .set("simulation.scans=24")
-        .set("simulation.sensor.profile=cts350x-radiate");
+    let run = Run::of_demo();
+    let run = run.sets("simulation.scans=24 simulation.sensor.profile=cts350x-radiate");
     assert_eq!(assert_same_bits(&run), 24);
 }
 
@@ -80,12 +76,8 @@ fn with_the_gyro_of_a_real_drive() {
     if let Some(data) = real_data("radiate-2019-02-12") {
         let log = data.join("imu_as_logged.csv");
         let run = configuration("radiate.toml").data(&data);
-        let run = run
-            .set("gyro.kind=log")
-            .set(&format!("gyro.file={}", log.display()))
-            .set("gyro.delay_s=1.58")
-            .set("gyro.up=-z")
-            .set("source.scans=80");
+        let run = run.sets("gyro.kind=log gyro.delay_s=1.58 gyro.up=-z source.scans=80");
+        let run = run.set(&format!("gyro.file={}", log.display()));
         assert_eq!(assert_same_bits(&run), 80);
         let summary = run.summary();
         assert!(summary["gyro"]["motions"].as_u64() > Some(50), "{summary}");
@@ -94,9 +86,7 @@ fn with_the_gyro_of_a_real_drive() {
 
 #[test]
 fn with_every_angle_tried() {
-    let run = Run::of_recording()
-        .set("search.kind=exhaustive")
-        .set("source.scans=10");
+    let run = Run::of_recording().sets("search.kind=exhaustive source.scans=10");
     assert_eq!(assert_same_bits(&run), 10);
     let summary = run.summary();
     let stages = [

@@ -7,7 +7,7 @@ use std::{
     path::Path,
 };
 
-use crate::common::{Ended, Run, folder, gyre, recording, runtime_is_installed};
+use crate::common::{Ended, Run, folder, gyre, names_in, recording, runtime_is_installed};
 use crate::method::learned_masks::card;
 use gyre_geometry::Twist;
 use nalgebra::{Isometry2, Vector2};
@@ -41,15 +41,6 @@ fn size_of(scans: u32, views: u32) -> (u32, u32) {
     (4 * PANEL + 5 * MARGIN, scans * height)
 }
 
-fn names(folder: &Path) -> Vec<String> {
-    let files = fs::read_dir(folder.join("out")).unwrap();
-    let mut names: Vec<String> = files
-        .map(|file| file.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
-}
-
 fn figures(ended: &Ended) -> Vec<Vec<f64>> {
     let figure = |text: &str| text.parse().unwrap_or(f64::NAN);
     ended
@@ -73,7 +64,7 @@ fn a_threshold_keeps_or_takes_and_no_mask_keeps_all() {
         assert!((percent - row[1]).abs() < 0.051, "{percent} {}", row[1]);
     }
     assert_eq!(
-        names(folder.path()),
+        names_in(&folder.path().join("out")),
         ["masks.png", "scan-000003.png", "scan-000012.png"]
     );
     let out = folder.path().join("out");
@@ -202,7 +193,8 @@ fn unreadable_scans_are_left_out_and_reported() {
     let ended = masks_of(damaged.path(), folder.path(), &["--scans", "4,5"]);
     let said = &ended.succeeded().stderr;
     assert!(said.starts_with("left out: "), "{said}");
-    assert_eq!(names(folder.path()), ["masks.png", "scan-000005.png"]);
+    let drawn = names_in(&folder.path().join("out"));
+    assert_eq!(drawn, ["masks.png", "scan-000005.png"]);
     masks_of(damaged.path(), folder.path(), &["--scans", "4"])
         .failed_with(&["none of the chosen scans can be read"]);
 }

@@ -37,13 +37,9 @@ fn all_results_are_there_and_account_for_every_scan() {
     for state in ["poses.journal", "refinement.map"] {
         assert!(run.out().join("journal").join(state).is_file(), "{state}");
     }
+    run.assert_counts("published=24 processed=24 scans_in_recording=24");
+    run.assert_counts("dropped=0 unreadable=0 breaks=0 resumed_after=0");
     let summary = run.summary();
-    for key in ["published", "processed", "scans_in_recording"] {
-        assert_eq!(summary[key], recording::SCANS, "{key}");
-    }
-    for key in ["dropped", "unreadable", "breaks", "resumed_after"] {
-        assert_eq!(summary[key], 0, "{key}");
-    }
     assert_eq!(summary["ending"], "complete");
     assert_eq!(summary["restarts"].as_object().unwrap().len(), 0);
     for stage in STAGES {
@@ -52,13 +48,6 @@ fn all_results_are_there_and_account_for_every_scan() {
         let processed = &summary["stages"][stage]["processed"];
         assert_eq!(*processed, recording::SCANS, "{stage}");
     }
-}
-
-#[test]
-fn a_repetition_gives_the_same_bytes() {
-    let run = Run::of_recording();
-    assert_eq!(run.complete(), undisturbed());
-    assert_eq!(run.complete(), undisturbed(), "in the same folder");
 }
 
 #[test]
@@ -80,12 +69,12 @@ fn an_interrupted_run_names_how_it_is_resumed_and_resumes_at_another_rate_and_wi
     let ended = running.finish();
     assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
     ended.prints("the same command resumes");
-    let processed = run.summary()["processed"].as_u64().unwrap();
+    let processed = run.count("processed");
     let partial = MIDDLE as u64..recording::SCANS as u64;
     assert!(partial.contains(&processed), "{processed}");
     let run = run.set("run.window=2");
     assert_eq!(run.complete(), undisturbed());
-    assert!(run.summary()["resumed_after"].as_u64() >= Some(processed));
+    assert!(run.count("resumed_after") >= processed);
 }
 
 #[test]
@@ -108,7 +97,7 @@ fn data_in_a_folder_with_any_name_are_played() {
     for name in ["2019-01-10", "1e5", "true", "it's a \"drive\""] {
         let link = run.folder().join(name);
         std::os::unix::fs::symlink(recording::small(), &link).unwrap();
-        let named = Run::of_recording_named(name);
+        let named = Run::small().option(name);
         let mut command = named.command();
         command.current_dir(run.folder());
         named.start_as(command).finish().succeeded();

@@ -5,7 +5,6 @@ use std::{
     collections::BTreeMap,
     io::{BufRead, BufReader, Write},
     net::TcpStream,
-    process::Command,
 };
 
 use gyre_client::Usage;
@@ -13,62 +12,12 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    common::{Ended, Run, Running, Server, odometry, python, recording},
+    common::{Ended, Run, Running, Server, asked, odometry, recording, script},
     reach::{only_if, python_has},
 };
 
 /// Bytes before the powers in each row of an image: the azimuth, its time and its flag.
 const ROW_HEADER: usize = 11;
-
-/// Subscribes to all channels by the Python package `websockets`, decodes the messages by their
-/// schemas, and prints them after so many poses and a message of each channel of the run.
-const VIEW: &str = "
-import base64, hashlib, json, struct, sys
-from mcap.records import Schema
-from mcap_protobuf.decoder import DecoderFactory
-from websockets.sync.client import connect
-place = lambda pose: [pose.position.x, pose.position.y]
-read = {
-    '/pose': lambda m: place(m.pose), '/refined': lambda m: place(m.pose),
-    '/tf': lambda m: [m.parent_frame_id, m.child_frame_id], '/trajectory': lambda m: [place(pose) for pose in m.poses],
-    '/scan': lambda m: [m.encoding, m.width, m.height, hashlib.sha256(m.data).hexdigest()],
-    '/masked': lambda m: [m.encoding, m.width, m.height, len(m.data)],
-    '/points': lambda m: [m.point_stride, len(m.data), [field.name for field in m.fields]],
-}
-url, poses = sys.argv[1], int(sys.argv[2])
-with connect(url, subprotocols=['foxglove.sdk.v1'], max_size=None) as socket:
-    info, advertised = json.loads(socket.recv()), json.loads(socket.recv())
-    assert (info['op'], info['capabilities'], advertised['op']) == ('serverInfo', ['time'], 'advertise'), info
-    channels = {channel['id']: channel for channel in advertised['channels']}
-    decoders = {}
-    for id, channel in channels.items():
-        if channel['encoding'] == 'protobuf':
-            schema = Schema(id=id + 1, name=channel['schemaName'], encoding='protobuf', data=base64.b64decode(channel['schema']))
-            decoders[id] = DecoderFactory().decoder_for('protobuf', schema)
-        else:
-            assert json.loads(channel['schema'])['type'] == 'object'
-            decoders[id] = json.loads
-    # Other numbers than the channels': they are distinguished.
-    subscriptions = [{'id': id + 100, 'channelId': id} for id in channels]
-    socket.send(json.dumps({'op': 'subscribe', 'subscriptions': subscriptions}))
-    received = {channel['topic']: {} for channel in channels.values()}
-    quiet = {'/log'}
-    time = 0
-    while len(received['/pose']) < poses or any(not received[topic] for topic in received.keys() - quiet):
-        message = socket.recv()
-        if isinstance(message, str):
-            continue
-        if message[0] == 2:
-            assert struct.unpack('<Q', message[1:])[0] > time
-            time, = struct.unpack('<Q', message[1:])
-            continue
-        kind, subscription, stamp = struct.unpack('<BIQ', message[:13])
-        assert kind == 1 and stamp <= time, (kind, stamp, time)
-        channel = channels[subscription - 100]
-        decoded = decoders[channel['id']](message[13:])
-        received[channel['topic']][stamp] = read.get(channel['topic'], lambda m: m if isinstance(m, dict) else None)(decoded)
-print(json.dumps(received))
-";
 
 /// A drive of 120 scans, half a minute at rate 1.
 fn driving(rate: &str) -> Run {
@@ -97,8 +46,8 @@ fn a_viewer_receives_the_scans_of_the_recording_and_the_motions_of_the_results()
     only_if!(python_has("mcap_protobuf, websockets"));
     let run = driving("1");
     let (running, server) = started(&run);
-    let mut viewer = Command::new(python());
-    viewer.args(["-c", VIEW, &server.foxglove(), "8"]);
+    let mut viewer = script("observers/foxglove.py");
+    viewer.args([&server.foxglove(), "8"]);
     let ended = Ended::of(viewer);
     ended.succeeded();
     running.interrupt();
@@ -163,14 +112,15 @@ fn powers(path: &std::path::Path) -> Value {
 fn connect(url: &str, query: &str, headers: &[&str]) -> (TcpStream, String) {
     let (address, _) = url.strip_prefix("ws://").unwrap().split_once('/').unwrap();
     let (_, port) = address.rsplit_once(':').unwrap();
-    let mut stream = TcpStream::connect(("127.0.0.1", port.parse().unwrap())).unwrap();
-    let headers = headers.iter().map(|header| format!("{header}\r\n"));
-    let headers: String = headers.collect();
-    let request = format!(
-        "GET /{query} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n{headers}\r\n"
-    );
-    stream.write_all(request.as_bytes()).unwrap();
+    let host = format!("Host: 127.0.0.1:{port}");
+    let upgrade = [
+        &host,
+        "Connection: Upgrade",
+        "Upgrade: websocket",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+    ];
+    let stream = asked(port, &format!("/{query}"), &[&upgrade, headers].concat());
     let mut answer = String::new();
     let mut reader = BufReader::new(stream.try_clone().unwrap());
     reader.read_line(&mut answer).unwrap();

@@ -4,7 +4,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
     thread,
     time::Duration,
 };
@@ -15,9 +14,9 @@ use serde_json::Value;
 
 use crate::{
     common::{
-        Ended, Run, finished, odometry, python,
+        Ended, Run, finished, odometry,
         recording::{SCANS, around_a_block},
-        send, undisturbed, with_tmpfs,
+        script, send, undisturbed, with_tmpfs,
     },
     operate::commands::{ask, await_status, process},
     reach::{only_if, python_has},
@@ -90,9 +89,8 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
 #[test]
 fn a_run_that_ended_before_its_first_pose_goes_on_with_its_recording() {
     for (mode, rate) in [("lossless", "max"), ("live", "4")] {
-        let run = recorded(&played().rate(rate)).set(ALL);
-        let run = run.set("source.scans=6").set(&format!("run.mode={mode}"));
-        let run = run.set("stages.refinement.delay_ms=800");
+        let settings = format!("run.mode={mode} source.scans=6 stages.refinement.delay_ms=800");
+        let run = recorded(&played().rate(rate)).set(ALL).sets(&settings);
         let mut running = run.start();
         running.await_stages();
         await_file(&file(&run));
@@ -150,8 +148,7 @@ fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
     let missed = SCANS - there.len();
     assert!(missed >= 4, "{there:?}");
     assert_eq!(recording.missed()["scan"], missed as u64);
-    let (said, missing) = (&ended.stderr, format!("missed {missed} scan"));
-    assert!(said.contains(&missing), "{said}");
+    ended.says(&format!("missed {missed} scan"));
     missed
 }
 
@@ -167,9 +164,8 @@ fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_count
     send(killed, Signal::KILL);
     running.await_child("record", Some(killed));
     let ended = running.finish();
-    ended.succeeded();
+    ended.succeeded().does_not_say("missed nothing");
     counted_as_missed(&run, &ended);
-    assert!(!ended.stderr.contains("missed nothing"), "{}", ended.stderr);
 }
 
 #[test]
@@ -210,8 +206,8 @@ fn the_recorder_is_listed_with_the_health_that_it_records_and_started_again_on_r
     };
     let first = recorder("a heartbeat", &|it| it["activity"] == "waiting");
     assert!(first["restarts"] == 0 && first["missed"] == 0, "{first}");
-    assert!(ask(&run, &["ps"]).stdout.contains("\n  recorder "));
-    assert!(ask(&run, &["top", "--once"]).stdout.contains("\nrecorder "));
+    ask(&run, &["ps"]).prints("\n  recorder ");
+    ask(&run, &["top", "--once"]).prints("\nrecorder ");
     ask(&run, &["restart", "recorder"]).succeeded();
     let second = recorder("a restart", &|it| it["activity"] == "waiting");
     assert_ne!(first["pid"], second["pid"]);
@@ -276,33 +272,10 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
         return;
     };
     let ended = recorded.start_as(command).finish();
-    ended.succeeded();
-    for part in ["No space left", "the run continues"] {
-        ended.says(part);
-    }
+    ended.succeeded().says("No space left");
+    ended.says("the run continues");
     assert_eq!(run.odometry(), undisturbed());
 }
-
-/// Prints the objects of a recording, as the Python package `mcap` decodes them by their schema: of
-/// each box the time, the identity, the place and the length, and the number of arrows.
-const READ_OBJECTS: &str = "
-import json, sys
-from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
-boxes, arrows = [], 0
-with open(sys.argv[1], 'rb') as file:
-    for schema, channel, message, decoded in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
-        topics=['/objects']
-    ):
-        assert schema.name == 'foxglove.SceneUpdate', schema.name
-        entity, = decoded.entities
-        assert (entity.frame_id, entity.id) == ('odometry', 'objects')
-        arrows += len(entity.arrows)
-        for cube, text in zip(entity.cubes, entity.texts, strict=True):
-            place = cube.pose.position
-            boxes.append([message.log_time, int(text.text), place.x, place.y, cube.size.x])
-print(json.dumps({'boxes': boxes, 'arrows': arrows}))
-";
 
 #[test]
 fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
@@ -310,8 +283,8 @@ fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
     let run = Run::small().data(around_a_block()).set(WINDOW);
     let run = recorded(&run.set("objects.kind=tracks").rate("20"));
     run.complete();
-    let mut command = Command::new(python());
-    command.args(["-c", READ_OBJECTS]).arg(file(&run));
+    let mut command = script("observers/objects.py");
+    command.arg(file(&run));
     let ended = Ended::of(command);
     ended.succeeded();
     let read: Value = serde_json::from_str(&ended.stdout).unwrap();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use gyre_contract::flag;
 use gyre_journal as journal;
-use gyre_recording::{open_recording, parts};
+use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
 
 use super::record::{ALL, WINDOW, file, recorded, replay};
@@ -28,6 +28,17 @@ fn scans_of_poses(run: &Run) -> BTreeMap<u64, u64> {
     let poses = poses.map(|pose| pose.unwrap().item);
     let poses = poses.filter(|item| !item.is(flag::END));
     poses.map(|item| (item.seq, item.scan)).collect()
+}
+
+/// Asserts that the messages of a topic are of the scans of the results. Returns the number of
+/// missing ones.
+fn lacking(recording: &Recording, scans: &BTreeMap<u64, u64>, topic: &str) -> u64 {
+    let entries: Vec<_> = recording.entries(topic).collect();
+    for entry in &entries {
+        let scan = scans.get(&entry.seq);
+        assert_eq!(scan, Some(&entry.scan), "{topic} {entry:?}");
+    }
+    (scans.len() - entries.len()) as u64
 }
 
 #[test]
@@ -64,12 +75,7 @@ fn a_recording_replays_to_the_results_after_masking_was_killed_with_the_recorder
     assert!(generations.is_sorted() && generations.last() > generations.first());
     let (scans, missed) = (scans_of_poses(&run), recording.missed());
     for topic in ["masked", "rotation", "motion", "refined"] {
-        let entries: Vec<_> = recording.entries(topic).collect();
-        for entry in &entries {
-            let scan = scans.get(&entry.seq);
-            assert_eq!(scan, Some(&entry.scan), "{topic} {entry:?}");
-        }
-        let lacks = (scans.len() - entries.len()) as u64;
+        let lacks = lacking(&recording, &scans, topic);
         assert!(lacks <= missed.get(topic).copied().unwrap_or_default());
         if lacks == 0 {
             let again = replay(&file(&run), &["--from", topic]);
@@ -96,12 +102,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
     let recording = open_recording(&file(&run)).unwrap();
     let scans = scans_of_poses(&run);
     for topic in ["masked", "motion"] {
-        let entries: Vec<_> = recording.entries(topic).collect();
-        for entry in &entries {
-            let scan = scans.get(&entry.seq);
-            assert_eq!(scan, Some(&entry.scan), "{topic} {entry:?}");
-        }
-        let lacks = (scans.len() - entries.len()) as u64;
+        let lacks = lacking(&recording, &scans, topic);
         assert!(lacks > 0);
         assert!(lacks <= recording.missed()[topic], "{topic} lacks {lacks}");
     }

@@ -238,8 +238,8 @@ fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
 
 #[test]
 fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
-    let run = long().rate(HALF_RATE).set("run.mode=live");
-    let run = run.set("stages.masking.delay_ms=50");
+    let run = long().rate(HALF_RATE);
+    let run = run.sets("run.mode=live stages.masking.delay_ms=50");
     let running = run.started(1);
     let shadow = Shadow::start(&run, "masking", "masking", &[]);
     // With many scans dropped, motions may be too long for the radar: that is a problem of its own.
@@ -251,8 +251,8 @@ fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
 
 #[test]
 fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
-    let run = Run::of_recording().rate("0.3").set("raster.n=63");
-    let run = run.set("search.kind=exhaustive");
+    let run = Run::of_recording().rate("0.3");
+    let run = run.sets("raster.n=63 search.kind=exhaustive");
     Ended::of(up(&run)).succeeded();
     let options = ["--scans", "3", "--nice", "15"];
     let shadow = Shadow::start(&run, "joint", "joint-search", &options);

@@ -233,9 +233,8 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     let killed = drives.batch("killed").with(&paced);
     kill_all_then_the_batch_then_a_run(&killed);
     assert!(killed.outcomes().iter().any(|it| it.ends_with(" killed")));
-    let last = killed.finish().stdout;
-    let before = "had been computed before";
-    assert!(last.contains(said) && last.contains(before), "{last}");
+    let last = killed.finish();
+    last.prints(said).prints("had been computed before");
     assert_eq!(killed.table(), calm.table());
 }
 
@@ -276,9 +275,8 @@ fn what_is_complete_stays_when_its_recording_is_gone() {
     let (recording, aside) = (drives.path("part-6"), drives.path("aside"));
     fs::rename(&recording, &aside).unwrap();
     let again = batch.finish();
-    let said = &again.succeeded().stderr;
-    let is_kept = said.contains("complete before");
-    assert!(is_kept && said.contains("there is nothing at"), "{said}");
+    again.succeeded().says("complete before");
+    again.says("there is nothing at");
     assert_eq!(batch.table(), table);
 
     // A configuration that became invalid is no success, whatever there was before.
@@ -296,8 +294,7 @@ fn what_is_complete_stays_when_its_recording_is_gone() {
     fs::remove_dir_all(batch.results("part-6")).unwrap();
     let collected = batch.clone().with(&["--collect"]).finish();
     assert_eq!(collected.code(), Some(1));
-    let said = collected.stderr;
-    assert!(said.contains("part-6: not-run"), "{said}");
+    collected.says("part-6: not-run");
     assert_eq!(batch.finish().code(), Some(1));
     assert_eq!(batch.outcomes(), ["part-6 failed"]);
     fs::rename(&aside, &recording).unwrap();
@@ -324,8 +321,7 @@ fn a_drive_is_computed_again_with_another_configuration_alone() {
     let other = batch.clone().with(&["--set", "search.kind='exhaustive'"]);
     let collected = other.clone().with(&["--collect"]).finish();
     assert_eq!(collected.code(), Some(1));
-    let reason = "part-6: not-run: it was computed with other settings";
-    collected.says(reason);
+    collected.says("part-6: not-run: it was computed with other settings");
     let ended = other.finish();
     let said = &ended.succeeded().stdout;
     assert!(!said.contains("before"), "{said}");
@@ -358,8 +354,7 @@ fn a_drive_that_was_killed_while_it_replaced_another_one_is_computed() {
     assert!(!aside.exists());
     // Nor does it stay for ever when nothing is computed.
     fs::create_dir(&aside).unwrap();
-    let again = other.finish();
-    assert!(again.succeeded().stdout.contains("computed before"));
+    other.finish().succeeded().prints("computed before");
     assert!(!aside.exists());
 }
 

@@ -1,14 +1,10 @@
 //! `gyre calibrate`: its findings in a recording, and a run with its file.
 
-use std::{
-    env, fs,
-    os::unix::fs::symlink,
-    path::{Path, PathBuf},
-};
+use std::{fs, os::unix::fs::symlink, path::Path};
 
 use tempfile::TempDir;
 
-use crate::common::{Ended, Run, gyre, recording};
+use crate::common::{Ended, Run, gyre, real_data, recording};
 
 /// Little to compare: as few scans as determine the constants, and points nearby.
 const FEW: &str = "source.scans=60";
@@ -33,6 +29,14 @@ fn wrongly_read(out: &Path, words: &[&str]) -> (String, f64) {
     let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
     let ended = calibrate(recording, out, &[&wrong, FEW, NEAR], words);
     (ended.succeeded().stdout.clone(), right_m)
+}
+
+/// The resolved configuration of a short run with a calibration.
+fn configuration_with(file: &Path, recording: &Path) -> String {
+    let run = Run::small().data(recording).set("source.scans=6");
+    let run = run.argument("--calibration", file.to_str().unwrap());
+    run.complete();
+    run.result("config.toml")
 }
 
 /// The range offset of a `dataset.toml`, or of a section `[dataset]`.
@@ -68,11 +72,7 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let file = out.path().join("calibration.toml");
     let found_m = range_offset_m(&fs::read_to_string(&file).unwrap());
     assert!((found_m - right_m).abs() < 0.1, "{found_m}, {right_m}");
-    let run = Run::of_recording_named(recording.to_str().unwrap())
-        .set("source.scans=6")
-        .argument("--calibration", file.to_str().unwrap());
-    run.complete();
-    let used_m = range_offset_m(&run.result("config.toml"));
+    let used_m = range_offset_m(&configuration_with(&file, recording));
     assert!((used_m - found_m).abs() < 1e-6, "{used_m}, {found_m}");
 }
 
@@ -127,11 +127,7 @@ fn a_drive_that_is_too_short_is_refused() {
 /// The three-point turn of a real drive: it determines the delay of its gyro, and is too short for
 /// the constants of the radar.
 fn turning() -> Option<TempDir> {
-    let Some(data) = env::var_os("GYRE_DATA").map(PathBuf::from) else {
-        println!("skipped: GYRE_DATA is not set");
-        return None;
-    };
-    let (drive, part) = (data.join("radiate-2019-02-12"), TempDir::new().unwrap());
+    let (drive, part) = (real_data("radiate-2019-02-12")?, TempDir::new().unwrap());
     let images = |of: &Path| of.join("Navtech_Polar");
     fs::create_dir(images(part.path())).unwrap();
     for number in 437..537 {
@@ -149,19 +145,14 @@ fn the_clock_and_the_axis_of_a_gyro_are_found_and_a_run_takes_them() {
     let Some(recording) = turning() else { return };
     let (recording, out) = (recording.path(), TempDir::new().unwrap());
     let ended = calibrate(recording, out.path(), &[], &["radiate"]);
-    let said = ended.succeeded().stdout.clone();
-    assert!(said.contains("gyro, axis up         -z\n"), "{said}");
+    ended.succeeded().prints("gyro, axis up         -z\n");
     let file = out.path().join("calibration.toml");
     let table: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
     let gyro = table["gyro"].as_table().unwrap();
     let delay_s = gyro["delay_s"].as_float().unwrap();
-    assert!((delay_s - 1.58).abs() < 0.06, "{said}");
+    assert!((delay_s - 1.58).abs() < 0.06, "{ended:?}");
     assert_eq!(gyro["kind"].as_str(), Some("auto"));
-    let run = Run::of_recording_named(recording.to_str().unwrap())
-        .set("source.scans=6")
-        .argument("--calibration", file.to_str().unwrap());
-    run.complete();
-    let used: toml::Table = run.result("config.toml").parse().unwrap();
+    let used: toml::Table = configuration_with(&file, recording).parse().unwrap();
     assert_eq!(used["gyro"]["delay_s"].as_float(), Some(delay_s));
     assert_eq!(used["gyro"]["up"].as_str(), Some("-z"));
 }

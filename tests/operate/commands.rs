@@ -150,7 +150,7 @@ fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
     ask(&run, &["down"]).succeeded();
     assert_nothing_left(run.out());
     assert!(!ask(&run, &["down"]).status.success());
-    let nowhere = Run::of_recording_named("/nowhere");
+    let nowhere = Run::small().option("/nowhere");
     Ended::of(up(&nowhere)).refused_with(&["/nowhere"]);
     assert!(run.result("log/gyre.txt").contains("interrupted"));
     assert_eq!(run.complete(), undisturbed());
@@ -198,10 +198,8 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
 #[test]
 fn a_stage_or_a_follower_that_hangs_is_restarted_alone() {
     for name in ["rotation-search", "loop-closure"] {
-        let run = Run::of_recording()
-            .rate("1")
-            .set("slam.kind=graph")
-            .set("run.stall_timeout_s=2");
+        let run = Run::of_recording().rate("1");
+        let run = run.sets("slam.kind=graph run.stall_timeout_s=2");
         let running = run.started(4);
         let status = await_status(&run, "followers", |it| {
             process(it, "loop-closure")["activity"] == "waiting"
@@ -220,7 +218,7 @@ fn logs_of_a_run_are_lines_of_the_process_that_is_asked_for() {
     let copy = recording::copy(8);
     let images = recording::images(copy.path());
     recording::truncate(&images[3], 1000);
-    let run = Run::of_recording_named(copy.path().to_str().unwrap());
+    let run = Run::small().data(copy.path());
     run.finish();
     ask(&run, &["logs", "radar-replay"])
         .succeeded()
@@ -260,7 +258,7 @@ fn top_shows_the_processes_of_a_run_in_a_terminal() {
         thread::sleep(Duration::from_millis(50));
     }
     let text = ask(&run, &["top", "--once", "--every", "0.2"]);
-    assert!(text.succeeded().stdout.contains("rotation-search"));
+    text.succeeded().prints("rotation-search");
     assert_eq!(running.complete(), undisturbed());
 }
 

@@ -134,7 +134,7 @@ fn a_run_reports_the_same_as_its_evaluation() {
 }
 
 #[test]
-fn a_file_that_is_no_odometry_is_refused_in_a_sentence() {
+fn what_is_no_odometry_is_refused_and_one_of_another_drive_is_left_out_with_the_reason() {
     let run = run();
     for (name, words) in [
         ("none.csv", ["cannot read", "none.csv"]),
@@ -143,11 +143,6 @@ fn a_file_that_is_no_odometry_is_refused_in_a_sentence() {
         let path = run.out().join(name);
         Ended::of(with(evaluate(&run), "--odometry", path)).refused_with(&words);
     }
-}
-
-#[test]
-fn an_odometry_of_another_drive_beside_the_trajectory_is_left_out_with_the_reason() {
-    let run = run();
     let other = run.odometry().replace(",154713", ",154714");
     fs::write(run.out().join("odometry.csv"), other).unwrap();
     let ended = Ended::of(evaluate(&run));
@@ -163,8 +158,7 @@ fn objects_are_evaluated_against_the_truth_of_their_recording() {
     let run = Run::small().data(data).set("objects.kind=tracks");
     run.complete();
     let against = |truth: &Path| finished!["evaluate", "--objects", run.out(), truth];
-    let printed = against(data);
-    assert!(printed.succeeded().stdout.contains("precision"));
+    against(data).succeeded().prints("precision");
     let empty = tempfile::tempdir().unwrap();
     fs::write(empty.path().join("objects.csv"), "").unwrap();
     against(empty.path()).failed_with(&["ground_truth.tum"]);

@@ -5,7 +5,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::common::{Run, STAGES, cpu_time, leftovers, processes, recording, send, undisturbed};
+use crate::common::{Run, STAGES, leftovers, processes, recording, send, undisturbed};
+use gyre_client::ProcessStat;
 use rustix::process::Signal;
 
 #[test]
@@ -42,12 +43,14 @@ fn an_idle_pipeline_uses_no_time_and_goes_on_afterwards() {
     let idle = stages.iter().filter(|(_, pid)| **pid != source);
     let idle = idle.map(|(name, pid)| (name.as_str(), *pid));
     let idle: Vec<_> = idle.chain([("supervisor", running.pid())]).collect();
-    let before: Vec<Duration> = idle.iter().map(|(_, pid)| cpu_time(*pid)).collect();
+    let cpu_s = |pid| ProcessStat::of(pid).unwrap().cpu_s;
+    let before: Vec<f64> = idle.iter().map(|(_, pid)| cpu_s(*pid)).collect();
     let since = Instant::now();
     thread::sleep(Duration::from_secs(3));
     for ((name, pid), before) in idle.iter().zip(before) {
-        let (used, of) = (cpu_time(*pid) - before, since.elapsed());
-        assert!(used < of / 100, "{name} computed for {used:?} of {of:?}");
+        let (used_s, of) = (cpu_s(*pid) - before, since.elapsed());
+        let is_idle = used_s < 0.01 * of.as_secs_f64();
+        assert!(is_idle, "{name} computed for {used_s} s of {of:?}");
     }
     send(source, Signal::CONT);
     assert_eq!(running.complete(), undisturbed());

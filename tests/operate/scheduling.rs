@@ -1,6 +1,6 @@
 //! Tests of scheduling: the priorities and processors of its stages, and how soon processors wake.
 
-use std::{fs, io::Read};
+use std::{fs::File, io::Read};
 
 use crate::common::{OtherUser, Pid, Run, leftovers, processes, recording, undisturbed};
 
@@ -12,10 +12,8 @@ const WAKE_LIMIT: &str = "/dev/cpu_dma_latency";
 /// The niceness of a process and the processors that it may use.
 fn priority(pid: Pid) -> (i32, String) {
     let nice = &processes::stat(pid).unwrap()[16];
-    let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-    let mut lines = status.lines();
-    let cpus = lines.find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
-    (nice.parse().unwrap(), cpus.unwrap().trim().to_owned())
+    let cpus = processes::status(pid, "Cpus_allowed_list").unwrap();
+    (nice.parse().unwrap(), cpus)
 }
 
 #[test]
@@ -44,7 +42,7 @@ fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restar
 
 /// The limit that the system keeps to, us.
 fn wake_limit() -> Option<i32> {
-    let (mut file, mut limit) = (fs::File::open(WAKE_LIMIT).ok()?, [0; 4]);
+    let (mut file, mut limit) = (File::open(WAKE_LIMIT).ok()?, [0; 4]);
     file.read_exact(&mut limit).ok()?;
     Some(i32::from_ne_bytes(limit))
 }

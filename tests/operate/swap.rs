@@ -87,8 +87,7 @@ fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
         assert_eq!(back["last_death"], Value::Null, "it was of another program");
     }
     ask(&run, &["down"]).succeeded();
-    let ended = running.end();
-    assert!(ended.stderr.contains("goes back to the program before"));
+    running.end().says("goes back to the program before");
     let rest = Run::of_recording().into(run.out());
     assert_eq!(rest.complete(), undisturbed());
 }
@@ -208,10 +207,8 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
 #[test]
 fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
     // A scan each second: the window of four gives a loaded machine time.
-    let run = Run::of_recording()
-        .rate("0.25")
-        .set("run.mode=live")
-        .set("source.scans=16");
+    let run = Run::of_recording().rate("0.25");
+    let run = run.sets("run.mode=live source.scans=16");
     let running = run.started(4);
     for &stage in BETWEEN {
         swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();

@@ -12,8 +12,8 @@ fn a_build_without_link_says_how_to_get_it() {
         finished!["link", end, "out", option, endpoint].refused_with(&["zenoh", REMEDY]);
     }
     for (side, key) in [("robot", "connect"), ("base", "listen")] {
-        let run = Run::of_recording().set(&format!("link.side='{side}'"));
-        let run = run.set(&format!("link.{key}=['{endpoint}']"));
+        let settings = format!("link.side='{side}' link.{key}=['{endpoint}']");
+        let run = Run::of_recording().sets(&settings);
         run.finish().refused_with(&["zenoh", REMEDY]);
     }
 }

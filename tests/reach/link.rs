@@ -5,18 +5,19 @@ use std::{
     io::{Read, Write},
     net::{Shutdown, TcpListener, TcpStream},
     path::{Path, PathBuf},
-    process::{Child, Command},
+    process::Command,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
     thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-use crate::common::{Ended, Run, finished, gyre, poses_of, recording, undisturbed, wrapped};
+use crate::common::{
+    Ended, Run, Spawned, finished, gyre, poses_of, recording, undisturbed, wrapped,
+};
 
-const MAX_WAIT: Duration = Duration::from_secs(60);
 /// Time for which the link is cut: longer than the time after which a connection is given up.
 const CUT: Duration = Duration::from_secs(5);
 
@@ -26,8 +27,7 @@ fn side(side: &str, cut: &str, endpoint: &str) -> Run {
         "robot" => Run::of_recording(),
         _ => Run::small(),
     };
-    let run = run.set(&format!("link.side='{side}'"));
-    run.set(&format!("link.cut='{cut}'")).set(endpoint)
+    run.sets(&format!("link.side='{side}' link.cut='{cut}' {endpoint}"))
 }
 
 /// Both sides over a free port of this machine: the base, and the robot.
@@ -120,8 +120,9 @@ fn a_robot_that_plays_another_drive_is_refused() {
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let [first, second] = [recording::small(), other.path()].map(|data| {
         let robot = Run::small().data(data).rate("2");
-        let robot = robot.set("link.side='robot'").set("link.cut='motion'");
-        robot.set(&format!("link.connect=['{address}']"))
+        robot.sets(&format!(
+            "link.side='robot' link.cut='motion' link.connect=['{address}']"
+        ))
     });
     let here = first.started(6);
     here.kill_supervisor();
@@ -180,10 +181,9 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let later = Run::small().data(other.path()).rate("0.4");
     let running = later.started(3);
-    let mut second = link.end("send", later.out()).spawn().unwrap();
+    let _second = link.sender(&later);
     let received = receiving.join().unwrap();
     received.failed_with(&["the sender plays a different drive now"]);
-    end(&mut second);
     running.finish().succeeded();
 }
 
@@ -197,7 +197,7 @@ fn nobody_connects_without_a_certificate_of_the_authority() {
     let sends = |certificates: &Certificates| {
         let mut send = link.end("send", run.out());
         certificates.give(&mut send, "base", ours.path("ca.pem"));
-        send.spawn().unwrap()
+        Spawned::new(send, run.folder().join("sender"))
     };
     let receives = |certificates: &Certificates, seconds: &str| {
         let seen = run.folder().join("seen");
@@ -206,19 +206,15 @@ fn nobody_connects_without_a_certificate_of_the_authority() {
         let interrupted = ["timeout", "-s", "INT", seconds];
         Ended::of(wrapped(&interrupted, &receive)).stderr
     };
-    let mut good = sends(&ours);
-    let seen = |said: &str| said.contains("is here as");
-    let said = receives(&theirs, "4");
-    assert!(!seen(&said), "a stranger has received: {said}");
-    end(&mut good);
-    let mut stranger = sends(&theirs);
-    let said = receives(&ours, "4");
-    assert!(!seen(&said), "a stranger has sent: {said}");
-    end(&mut stranger);
-    let mut good = sends(&ours);
-    let said = receives(&ours, "20");
-    assert!(seen(&said), "{said}");
-    end(&mut good);
+    for (sender, receiver, seconds, expected) in [
+        (&ours, &theirs, "4", false),
+        (&theirs, &ours, "4", false),
+        (&ours, &ours, "20", true),
+    ] {
+        let _sender = sends(sender);
+        let said = receives(receiver, seconds);
+        assert_eq!(said.contains("is here as"), expected, "{said}");
+    }
     running.kill_supervisor();
 }
 
@@ -246,29 +242,19 @@ impl Link {
     /// Starts a receiver of a run, whose sender is killed when poses have come.
     fn lose_sender(&self, run: &Run) -> thread::JoinHandle<Ended> {
         let seen = run.folder().join("seen");
-        let mut sender = self.end("send", run.out()).spawn().unwrap();
+        let sender = self.sender(run);
         let receiving = self.start("receive", &seen);
-        await_poses(&seen);
-        end(&mut sender);
+        sender.until(|_| (poses_of(&seen) > 1).then_some(()));
         receiving
+    }
+
+    fn sender(&self, run: &Run) -> Spawned {
+        Spawned::new(self.end("send", run.out()), run.folder().join("sender"))
     }
 
     fn start(&self, end: &str, out: &Path) -> thread::JoinHandle<Ended> {
         let command = wrapped(&["timeout", "120"], &self.end(end, out));
         thread::spawn(move || Ended::of(command))
-    }
-}
-
-fn end(process: &mut Child) {
-    process.kill().unwrap();
-    process.wait().unwrap();
-}
-
-fn await_poses(out: &Path) {
-    let since = Instant::now();
-    while poses_of(out) < 2 {
-        assert!(since.elapsed() < MAX_WAIT, "waited in vain for poses");
-        thread::sleep(Duration::from_millis(20));
     }
 }
 

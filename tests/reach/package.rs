@@ -9,14 +9,19 @@ use std::{
 
 use toml::{Table, Value};
 
-use crate::{PROJECT, common::gyre};
+use crate::{
+    PROJECT,
+    common::{entries_of, gyre},
+};
 
-const CONTAINERFILE: &str = "configs/container/Containerfile";
+/// The text of a file of the project.
+fn read(path: &str) -> String {
+    fs::read_to_string(Path::new(PROJECT).join(path)).unwrap()
+}
 
 /// The section of cargo-deb. Its paths are relative to the package's folder.
 fn package() -> Table {
-    let manifest = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
-    let manifest: Table = manifest.unwrap().parse().unwrap();
+    let manifest: Table = read("services/gyre/Cargo.toml").parse().unwrap();
     let metadata = &manifest["package"]["metadata"]["deb"];
     metadata.as_table().unwrap().clone()
 }
@@ -32,8 +37,7 @@ fn files(pattern: &str) -> Vec<PathBuf> {
     let Some((begin, end)) = name.split_once('*') else {
         return path.is_file().then_some(path).into_iter().collect();
     };
-    let entries = fs::read_dir(path.parent().unwrap()).unwrap();
-    let files = entries.map(|entry| entry.unwrap().path());
+    let files = entries_of(path.parent().unwrap()).into_iter();
     files
         .filter(|file| {
             let name = file.file_name().unwrap().to_str().unwrap();
@@ -69,8 +73,7 @@ fn the_debian_package_has_what_its_unit_and_its_configurations_name() {
     for path in package()["conf-files"].as_array().unwrap() {
         assert!(has(text(path)), "{path}");
     }
-    let unit = fs::read_to_string(Path::new(PROJECT).join("configs/systemd/gyre@.service"));
-    let unit = unit.unwrap();
+    let unit = read("configs/systemd/gyre@.service");
     let of = |key: &str| unit.lines().find_map(|line| line.strip_prefix(key));
     let mut command = of("ExecStart=").unwrap().split(' ');
     assert!(has(command.next().unwrap()));
@@ -78,8 +81,7 @@ fn the_debian_package_has_what_its_unit_and_its_configurations_name() {
     assert!(parsed.status.success(), "{parsed:?}");
     assert!(has(of("Documentation=file://").unwrap()));
     let folder = of("WorkingDirectory=-").unwrap();
-    let demo = fs::read_to_string(Path::new(PROJECT).join("configs/demo.toml"));
-    let demo: Table = demo.unwrap().parse().unwrap();
+    let demo: Table = read("configs/demo.toml").parse().unwrap();
     let model = text(&demo["masking"]["model"]);
     assert!(has(&format!("{folder}/{model}")), "{model}");
 }
@@ -96,7 +98,7 @@ fn the_scripts_of_the_debian_package_are_shell() {
 
 #[test]
 fn the_container_starts_commands_that_gyre_has_on_files_of_the_package() {
-    let recipe = fs::read_to_string(Path::new(PROJECT).join(CONTAINERFILE)).unwrap();
+    let recipe = read("configs/container/Containerfile");
     let words = |instruction: &str| -> Vec<String> {
         let (_, list) = recipe.rsplit_once(instruction).unwrap();
         serde_json::from_str(list.lines().next().unwrap()).unwrap()

@@ -133,10 +133,8 @@ fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
     let run = failing("masking", &file);
     let place = format!("{}, line 3: KeyError: 'wall'", file.display());
     run.finish().failed_with(&["masking", &place]);
-    let printed = ask(&run, &["logs", "masking"]).stdout;
-    for words in ["Traceback", "in helper"] {
-        assert!(printed.contains(words), "{printed}");
-    }
+    let logs = ask(&run, &["logs", "masking"]);
+    logs.prints("Traceback").prints("in helper");
 }
 
 #[test]
@@ -239,6 +237,15 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
     run.finish().refused_with(&[is_another]);
 }
 
+/// Begins a stage in a folder, and returns its project.
+fn begun(folder: &TempDir, stage: &str, options: &[&str]) -> PathBuf {
+    let mut new = gyre();
+    new.current_dir(folder).args(["new", "stage", stage]);
+    new.args(options);
+    Ended::of(new).succeeded();
+    folder.path().join(format!("my-{stage}"))
+}
+
 #[test]
 #[ignore = ".ci/nightly: begins stages and holds them to their contracts"]
 fn begun_stages_keep_the_contract_and_drive() {
@@ -249,11 +256,7 @@ fn begun_stages_keep_the_contract_and_drive() {
         ("translation-search", "translation"),
     ] {
         let folder = folder();
-        let mut new = gyre();
-        new.current_dir(&folder)
-            .args(["new", "stage", stage, "--python"]);
-        Ended::of(new).succeeded();
-        let project = folder.path().join(format!("my-{stage}"));
+        let project = begun(&folder, stage, &["--python"]);
         let file = project.join(format!("{function}.py"));
         finished!["conformance", stage, "--scans", "12", "--python", &file].succeeded();
         let odometry = with(Run::of_recording(), stage, &file).complete();
@@ -266,11 +269,7 @@ fn begun_stages_keep_the_contract_and_drive() {
 fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
     let folder = folder();
     for stage in ["masking", "rotation-search", "translation-search"] {
-        let mut new = gyre();
-        new.current_dir(&folder)
-            .args(["new", "stage", stage, "--rust", "--gyre", crate::PROJECT]);
-        Ended::of(new).succeeded();
-        let project = folder.path().join(format!("my-{stage}"));
+        let project = begun(&folder, stage, &["--rust", "--gyre", crate::PROJECT]);
         let mut build = Command::new("cargo");
         build.current_dir(&project).args(["build", "--quiet"]);
         build.env("CARGO_TARGET_DIR", folder.path().join("target"));

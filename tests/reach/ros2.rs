@@ -5,7 +5,6 @@
 use std::{
     collections::BTreeMap,
     io::{BufRead, BufReader, Lines},
-    path::Path,
     process::{self, Child, ChildStdout, Command, Stdio},
 };
 
@@ -13,7 +12,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::{
-    common::{Run, gyre, odometry, python},
+    common::{Run, gyre, odometry, script},
     reach::{only_if, python_has},
 };
 
@@ -49,10 +48,8 @@ impl Program {
     }
 
     /// A peer in Python.
-    pub(crate) fn peer(script: &str, arguments: &[&str]) -> Self {
-        let scripts = Path::new(crate::PROJECT).join("tests/reach/ros2");
-        let mut command = Command::new(python());
-        Self::start(command.arg(scripts.join(script)).args(arguments))
+    pub(crate) fn peer(name: &str, arguments: &[&str]) -> Self {
+        Self::start(script(&format!("reach/ros2/{name}")).args(arguments))
     }
 
     /// A bridge that waits for the run. Its sentences for the terminal count as its lines.

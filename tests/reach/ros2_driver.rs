@@ -10,7 +10,7 @@ use crate::{
     common::{Run, odometry, recording, recording::with_constants},
     live::{
         gnss,
-        gyro::{SCANS, address, with_log},
+        gyro::{SCANS, with_log},
         radar::{Radar, whole},
     },
     observers::record::recorded,
@@ -55,11 +55,9 @@ impl Driver {
 
 /// A run that receives so many scans from a topic in a domain.
 fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
-    let run = run
-        .argument("--ros2", topic)
-        .set("source.interface='127.0.0.1'");
-    let run = run.set(&format!("source.domain={domain}"));
-    run.set(&format!("source.scans={scans}"))
+    run.argument("--ros2", topic).sets(&format!(
+        "source.interface='127.0.0.1' source.domain={domain} source.scans={scans}"
+    ))
 }
 
 /// Of a driver as it is, of one before 2024, and of one that publishes whole turns.
@@ -78,16 +76,12 @@ fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
         let _driver = Driver::playing(whole.path(), &domain, publishes, &[], &[]);
         let run = receiving(with_constants(Run::small()), &domain, topic, scans);
         let live = run.complete();
-        let source = &run.summary()["stages"]["radar-replay"];
-        for lost in [
-            "missing_azimuths",
-            "damaged_messages",
-            "scans_left_out",
-            "reconnections",
-        ] {
-            assert_eq!(source[lost], 0, "{publishes}: {lost}");
+        let losses = "missing_azimuths damaged_messages scans_left_out reconnections";
+        for lost in losses.split(' ') {
+            let key = format!("stages/radar-replay/{lost}");
+            assert_eq!(run.count(&key), 0, "{publishes}: {lost}");
         }
-        assert_eq!(run.summary()["dropped"], 0);
+        run.assert_counts("dropped=0");
         assert!(live == recorded, "{publishes}: {live}\n{recorded}");
     }
 }
@@ -113,11 +107,9 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
     let domain = domain(9);
     let _driver = Driver::playing(whole.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
-    let run = run.set("gyro.kind=ros2").set("gyro.max_wait_ms=200");
-    let run = run.set("wheels.kind=ros2");
+    let run = run.sets("gyro.kind=ros2 gyro.max_wait_ms=200 wheels.kind=ros2");
     let live = run.complete();
-    let summary = run.summary();
-    let used = ["gyro", "wheels"].map(|of| summary[of]["motions"].as_u64().unwrap_or(0) as usize);
+    let used = ["gyro", "wheels"].map(|of| run.count(&format!("{of}/motions")) as usize);
     assert!(used.iter().all(|used| *used > SCANS / 2));
     if used == [SCANS - 1; 2] {
         let recorded = Run::small().data(whole.path()).set("gyro.kind=auto");
@@ -135,8 +127,7 @@ fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
     let domain = domain(11);
     let _driver = Driver::playing(drive.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, gnss::SCANS);
-    let run = recorded(&gnss::with_graph(run, &address(6))).set("gnss.kind=ros2");
-    let run = run.set("gnss.topic='/fix'");
+    let run = recorded(&gnss::with_graph(run)).sets("gnss.kind=ros2 gnss.topic='/fix'");
     run.complete();
     let gnss = run.summary()["gnss"].clone();
     let fixes = gnss["fixes"].as_u64().unwrap() as usize;

@@ -3,7 +3,7 @@
 
 use std::{fs::File, path::Path, process::Command};
 
-use crate::common::{Ended, Run, gyre, recording, undisturbed, with_tmpfs, wrapped};
+use crate::common::{Ended, Run, entries_of, gyre, recording, undisturbed, with_tmpfs, wrapped};
 
 /// A device on which every write fails as on a full disk.
 fn full() -> File {
@@ -77,9 +77,8 @@ fn a_full_disk_ends_a_run_with_the_reason_and_a_live_one_when_all_poses_are_comp
 fn logs_that_cannot_be_written_do_not_disturb_a_run() {
     let run = Run::of_recording();
     run.interrupt("6", 3);
-    let logs = run.out().join("log").read_dir().unwrap();
-    let logs = logs.map(|log| log.unwrap().path());
-    for log in logs.chain([run.out().join("log.jsonl")]) {
+    let logs = entries_of(&run.out().join("log"));
+    for log in logs.into_iter().chain([run.out().join("log.jsonl")]) {
         std::fs::remove_file(&log).unwrap();
         std::os::unix::fs::symlink(Path::new("/dev/full"), &log).unwrap();
     }

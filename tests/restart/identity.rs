@@ -18,7 +18,7 @@ use crate::{
 use tempfile::TempDir;
 
 fn run_of(recording: &TempDir) -> Run {
-    Run::of_recording_named(recording.path().to_str().unwrap())
+    Run::small().data(recording.path())
 }
 
 /// Sets another offset of the ranges in `dataset.toml`; returns the file and its content before.

@@ -3,11 +3,7 @@
 
 use std::fs;
 
-use crate::common::{
-    Pid, Run, leftovers, odometry,
-    recording::{MIDDLE, MODERATE},
-    send, undisturbed,
-};
+use crate::common::{Pid, Run, leftovers, recording::MODERATE, send, undisturbed};
 use rustix::process::Signal;
 
 /// Stops a process as a replacement may hang that writes no heartbeat.
@@ -73,21 +69,4 @@ fn a_stage_that_cannot_work_is_given_up_and_ends_the_run_with_its_reason() {
             "{ended:?}"
         );
     }
-}
-
-#[test]
-fn what_was_computed_before_giving_up_is_kept_and_the_same_command_goes_on() {
-    let run = Run::of_recording()
-        .rate(MODERATE)
-        .set("stages.masking.restart.limit=0");
-    let mut running = run.start();
-    running.await_poses(MIDDLE).kill("masking");
-    running.finish().failed_with(&[
-        "masking died",
-        "signal 9",
-        "poses are kept",
-        "the same command resumes",
-    ]);
-    assert!(odometry::rows(&run.odometry()).len() + 1 >= MIDDLE);
-    assert_eq!(run.complete(), undisturbed());
 }

@@ -52,10 +52,7 @@ fn a_stage_that_fails_while_it_is_ended_fails_the_run() {
 
 #[test]
 fn a_stage_that_always_has_work_does_not_hang() {
-    let limit_s = 4;
-    let run = Run::of_recording()
-        .set(&format!("run.stall_timeout_s={limit_s}"))
-        .set("stages.masking.delay_ms=400");
+    let run = Run::of_recording().sets("run.stall_timeout_s=4 stages.masking.delay_ms=400");
     assert_eq!(run.complete(), undisturbed());
     // There was always a scan in its queue, for longer than the limit.
     assert_eq!(run.summary()["restarts"], serde_json::json!({}));

@@ -9,11 +9,10 @@ use crate::common::{Ended, Run, finished};
 
 fn drive(streets: u64, seed: u64) -> Run {
     let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
-        .set(&format!("simulation.seed={streets}"))
-        .set(&format!("simulation.sensor.seed={seed}"))
-        .set("simulation.sensor.profile=cts350x-radiate")
-        .set("slam.kind=graph");
-    run.set("simulation.scans=40")
+        .sets("simulation.sensor.profile=cts350x-radiate slam.kind=graph simulation.scans=40");
+    run.sets(&format!(
+        "simulation.seed={streets} simulation.sensor.seed={seed}"
+    ))
 }
 
 /// Two thirds of the block.
@@ -38,9 +37,7 @@ fn extend(run: &Run, map: &Path, out: &Path) -> Ended {
 fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     let (first, map) = first();
     // From half way round on, to the end of the block.
-    let second = drive(3, 9)
-        .set("simulation.scans=64")
-        .set("source.first=20");
+    let second = drive(3, 9).sets("simulation.scans=64 source.first=20");
     second.complete();
     let out = second.folder().join("map");
     extend(&second, &map, &out)

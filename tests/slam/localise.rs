@@ -155,8 +155,7 @@ fn a_run_that_names_a_map_publishes_the_places_of_its_keyframes() {
     let run = plain
         .clone()
         .into(&plain.folder().join("mapped"))
-        .set("slam.kind=graph")
-        .set(&format!("slam.map='{}'", map.display()))
+        .sets(&format!("slam.kind=graph slam.map='{}'", map.display()))
         .rate("20");
     let mut running = run.start();
     running.await_stage("localisation");

@@ -1,19 +1,14 @@
 //! Results of a run with SLAM: a drive that comes back to its start is corrected by loops.
 
-use std::{process::Command, sync::Arc};
+use std::sync::Arc;
 
 use gyre_geometry::xy_yaw;
 use gyre_slam::estimation::G2o;
 
 use crate::{
-    common::{Ended, Run, Shared, python},
+    common::{Ended, Run, Shared, script},
     reach::{only_if, python_has},
 };
-
-const GTSAM: &str = "import gtsam, sys
-graph, poses = gtsam.readG2o(sys.argv[1], False)
-last = poses.atPose2(poses.size() - 1)
-print(graph.size(), poses.size(), last.x(), last.y(), last.theta())";
 
 /// Once around a block.
 fn run(kind: &str) -> Run {
@@ -60,8 +55,8 @@ fn a_drive_that_comes_back_is_corrected_by_loops() {
 fn gtsam_reads_all_of_a_graph() {
     only_if!(python_has("gtsam"));
     let run = corrected();
-    let mut command = Command::new(python());
-    command.args(["-c", GTSAM]).arg(run.out().join("graph.g2o"));
+    let mut command = script("slam/g2o.py");
+    command.arg(run.out().join("graph.g2o"));
     let read = Ended::of(command);
     read.succeeded();
     let read: Vec<f64> = read

@@ -8,7 +8,7 @@ use gyre_configuration::{Configuration, terminal::{Failure, print}};
 use gyre_datasets::ground_truth::read_trajectory;
 use gyre_slam::{localisation::{Localiser, PlacedDrive}, Keyframe, RecordReader, records_path};
 use gyre_storage::{self as storage, StorageError};
-use gyre_tools::maps::{localise::searched_map, map::{self, placing}};
+use gyre_tools::maps::{localise, map::{self, placing}};
 use serde::Serialize;
 
 /// The table of all changes.
@@ -86,9 +86,9 @@ fn open_earlier(earlier: &Path, configuration: &Configuration) -> Result<Localis
         true => {
             let mut of_run = map::open(earlier)?;
             let poses = read_trajectory(&map::trajectory_of(earlier))?;
-            searched_map::plan(map::placed(&mut of_run, &poses)?, configuration)
+            localise::plan(map::placed(&mut of_run, &poses)?, configuration)
         }
-        false => searched_map::open(earlier, configuration),
+        false => localise::localiser(earlier, configuration),
     }
 }
 

@@ -21,7 +21,7 @@ use clap::{Args, ValueEnum, builder::PossibleValue};
 use gyre_datasets::{Dataset, DatasetOptions};
 use gyre_geometry::OwnedScan;
 use gyre_configuration::terminal::{Failure, print};
-use gyre_tools::masks::picture::write_grey;
+use gyre_tools::export::write_grey;
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

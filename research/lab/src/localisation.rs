@@ -10,7 +10,7 @@ use figures::{First, FixError, Tracking};
 use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_slam::localisation::{Fix, Localiser, Status};
-use gyre_tools::maps::localise::{Scans, searched_map};
+use gyre_tools::maps::localise::{Scans, localiser};
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::{recording::Track, report::{make_folder, publish}};
@@ -57,7 +57,7 @@ pub struct LocalisationArguments {
 pub fn localisation(arguments: &LocalisationArguments) -> Result<ExitCode, Failure> {
     let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
     let configuration = configuration.streaming(Some(&arguments.data));
-    let mut localiser = searched_map::open(&arguments.map, &configuration)?;
+    let mut localiser = localiser(&arguments.map, &configuration)?;
     let truth = Truth::read(arguments, &localiser)?;
     let mut scans = Scans::open(&configuration)?;
     make_folder(&arguments.out)?;

@@ -162,7 +162,7 @@ fn corrupted_small(folder: &Path, fault: &str) -> PathBuf {
 #[test]
 fn scans_that_a_recording_lacks_are_counted() {
     let folder = tempfile::tempdir().unwrap();
-    let run = Run::of_recording_named(corrupted_small(folder.path(), "dropped").to_str().unwrap());
+    let run = Run::small().data(&corrupted_small(folder.path(), "dropped"));
     let rows = odometry::rows(&run.complete());
     assert_eq!(rows.len(), recording::SCANS - 1 - 2);
     odometry::assert_unbroken(&rows);
@@ -172,7 +172,7 @@ fn scans_that_a_recording_lacks_are_counted() {
 #[test]
 fn a_corrupted_scan_is_a_scan_all_the_same() {
     let folder = tempfile::tempdir().unwrap();
-    let run = Run::of_recording_named(corrupted_small(folder.path(), "noise").to_str().unwrap());
+    let run = Run::small().data(&corrupted_small(folder.path(), "noise"));
     assert_eq!(odometry::rows(&run.complete()).len(), recording::SCANS - 1);
     assert_eq!(
         (&run.summary()["missing"], &run.summary()["unreadable"]),

@@ -17,14 +17,11 @@ use gyre_configuration::{
 };
 use gyre_results::{Content, Form, Identity, Out, OutError, SUMMARY};
 use gyre_tools::batch::{End, List, Outcome, Row, compute, table};
-use gyre_transport::run::end_with;
-use rustix::process::Signal;
 
 use crate::{
-    arguments::RunArguments,
+    arguments::{RunArguments, resolve, results_folder},
     earlier::{self, Earlier},
-    program,
-    run::{self, resolve},
+    plan, run,
 };
 
 /// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.
@@ -143,8 +140,8 @@ fn sentence(rows: &[Row], earlier: usize) -> String {
 
 /// Computes a drive in a process of its own, unless it has been computed with the same
 /// configuration from the same scans, and prints its end.
-pub fn drive(parent: i32, run: &RunArguments) -> Result<ExitCode, Failure> {
-    if !end_with(parent, Signal::TERM)? {
+pub fn drive(run: &RunArguments) -> Result<ExitCode, Failure> {
+    if !run.options.ends_with_parent()? {
         return Ok(ExitCode::FAILURE);
     }
     let end =
@@ -168,7 +165,7 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
         )
         .into());
     }
-    let (folder, deadline) = (run::results_folder(arguments)?, Instant::now() + ENDING);
+    let (folder, deadline) = (results_folder(arguments)?, Instant::now() + ENDING);
     let out = loop {
         match Out::lock(&folder) {
             Err(OutError::Held(_)) if Instant::now() < deadline => thread::sleep(LOOK),
@@ -181,14 +178,15 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     run::place_recording(&mut configuration, &out);
     // By whatever build. `None`: a run reports files that cannot be read, and keeps its poses.
     let is_same = Identity::read(&out)
-        .and_then(|begun| begun.has_inputs_of(&configuration, &program::replaced(&configuration)?))
+        .and_then(|begun| begun.has_inputs_of(&configuration, &plan::replaced(&configuration)?))
         .ok();
     let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
     if is_complete && is_same == Some(true) {
         return Ok(End::new(Outcome::Complete, true, ""));
     }
     // A run of another configuration, build or version is discarded.
-    let earlier = Earlier::of(&out, &configuration, &program::now(&configuration)?, false)?;
+    let programs = plan::programs(&configuration)?;
+    let earlier = Earlier::of(&out, &configuration, &programs, false)?;
     let is_foreign = matches!(earlier, Earlier::Foreign(_) | Earlier::Complete(_));
     let discards = is_foreign || is_same == Some(false);
     match run::compute(configuration, out, discards, Form::Table)? {

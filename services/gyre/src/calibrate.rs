@@ -1,12 +1,10 @@
 //! `gyre calibrate`: finds the constants of a radar from drives alone, and the clock, the axis and
 //! the scale of the sensors beside it.
 
-mod check;
 mod sensors;
 
 use std::{
     path::{Path, PathBuf},
-    process::ExitCode,
     time::Instant,
 };
 
@@ -17,8 +15,11 @@ use gyre_configuration::{
     terminal::{Failure, inputs::Inputs, print},
     with_stored_options,
 };
-use gyre_geometry::{OwnedScan, SweepGeometry};
-use gyre_results::{Content, Out};
+use gyre_datasets::{DatasetOptions, ground_truth::read_trajectory};
+use gyre_geometry::OwnedScan;
+use gyre_matching::odometry::Odometry;
+use gyre_radar::Trajectory;
+use gyre_results::{Content, Out, judgement::judge, truth_of};
 use gyre_storage as storage;
 use gyre_tools::bar::Bar;
 use sensors::{Section, Sensor};
@@ -62,7 +63,7 @@ const SECTION: &str = "calibration.toml";
 const PICTURE: &str = "calibration.svg";
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
-pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
+pub fn calibrate(arguments: &CalibrateArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);
     let _locked = Out::lock_for(&arguments.out, Content::CALIBRATION)?;
@@ -70,7 +71,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let sensors = Section::of(&drives)?;
     let radar = found_by(drives, &arguments.out);
     let found = radar.as_ref().ok();
-    let ates_m = found.and_then(|it| check::ates_m(arguments, it));
+    let ates_m = found.and_then(|it| ates_m(arguments, it));
     let is_worse = ates_m.is_some_and(|[before, after]| after > before);
     let better = if is_worse { "NOT better" } else { "better" };
     let check = ates_m.map_or(
@@ -86,7 +87,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
             print::note(format_args!("the radar is not calibrated: {error}"));
             format!("# Found by gyre calibrate. The radar is not calibrated: {error}\n")
         }
-        Err(_) => return radar.map(|_| ExitCode::SUCCESS),
+        Err(_) => return radar.map(drop),
     };
     storage::write(&file, text + &sensors.text)?;
     let (seconds, file) = (started.elapsed().as_secs_f64(), file.display());
@@ -99,7 +100,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         print::line(format_args!("{:<21} {check}", "check"))?;
         print::line(found.overlap())?;
     }
-    sensors.refused.map_or(Ok(ExitCode::SUCCESS), Err)
+    sensors.refused.map_or(Ok(()), Err)
 }
 
 fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {
@@ -144,15 +145,45 @@ impl Recorded {
     ) -> Result<Self, Failure> {
         let sensors = Sensor::read_all(&configuration, arguments)?;
         sensors::leave_out(&mut configuration.odometry.sensors);
-        let configuration = &configuration;
-        let (drive, geometry) = read(configuration, arguments)?;
-        let dataset = with_stored_options(configuration)?.dataset;
+        let Played { mut dataset, .. } = gyre_configuration::open(&configuration)?;
+        describe_masks_in_process(&configuration)?
+            .iter()
+            .for_each(print::note);
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        let mut drive = Drive::new(&configuration.odometry)?;
+        let played = configuration.source.played(dataset.scans());
+        let (all, count) = (played.len(), played.len().min(arguments.scans));
+        if count < all {
+            let sentence = format!(
+                "only the first {count} of {all} scans are used: --scans {all} takes them all"
+            );
+            if arguments.distance_m.is_some() {
+                return Err(format!("{sentence}, which --distance-m needs").into());
+            }
+            print::note(sentence);
+        }
+        let mut progress = Bar::new(Some(count));
+        for (done, number) in played.take(count).enumerate() {
+            let pushed = match dataset.read(number, scan.slot()) {
+                Ok(geometry) => {
+                    scan.geometry = geometry;
+                    drive.push(number, &scan).map_err(|error| error.to_string())
+                }
+                Err(error) => Err(error.to_string()),
+            };
+            if let Err(reason) = pushed {
+                progress.say(&format!("left out scan {number}: {reason}"));
+            }
+            progress.scans(done as u64, done as u64, "read".to_owned());
+        }
+        progress.finish();
+        let options = with_stored_options(&configuration)?.dataset;
         Ok(Self {
             name: configuration.data(),
             drive,
             configured: Configured {
-                geometry,
-                eccentricity_rad: dataset.azimuth_eccentricity_rad.unwrap_or(0.0).into(),
+                geometry: scan.geometry,
+                eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0).into(),
                 min_range_m: configuration.odometry.points.min_range_m.into(),
                 distance_m: arguments.distance_m,
             },
@@ -194,41 +225,40 @@ impl Recorded {
     }
 }
 
-/// Registers the scans of a recording, as many as are asked for at most.
-fn read(
-    configuration: &Configuration,
-    arguments: &CalibrateArguments,
-) -> Result<(Drive, SweepGeometry), Failure> {
-    let Played { mut dataset, .. } = gyre_configuration::open(configuration)?;
-    describe_masks_in_process(configuration)?
-        .iter()
-        .for_each(print::note);
+/// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.
+fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f64; 2]> {
+    let mut configuration = arguments.inputs.configuration().ok()?;
+    sensors::leave_out(&mut configuration.odometry.sensors);
+    let truth = read_trajectory(&truth_of(&configuration, &arguments.out)?).ok()?;
+    let before = ate_m(&configuration, arguments.scans, &truth).ok()?;
+    let file: ::toml::Table = toml(found).parse().ok()?;
+    let constants: DatasetOptions = file["dataset"].clone().try_into().ok()?;
+    configuration.dataset = constants.or(&configuration.dataset);
+    if let Some(min_range_m) = found.min_range_m {
+        configuration.odometry.points.min_range_m = min_range_m as f32;
+        configuration.odometry.raster.min_range_m = min_range_m as f32;
+    }
+    // If the drive cannot be registered with the constants, they are worse.
+    let after = ate_m(&configuration, arguments.scans, &truth);
+    Some([before, after.unwrap_or(f64::INFINITY)])
+}
+
+fn ate_m(configuration: &Configuration, scans: usize, truth: &Trajectory) -> Result<f64, Failure> {
+    let mut dataset = gyre_configuration::open(configuration)?.dataset;
+    let mut odometry = Odometry::new(&configuration.odometry)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
-    let mut drive = Drive::new(&configuration.odometry)?;
-    let played = configuration.source.played(dataset.scans());
-    let (all, count) = (played.len(), played.len().min(arguments.scans));
-    if count < all {
-        let sentence =
-            format!("only the first {count} of {all} scans are used: --scans {all} takes them all");
-        if arguments.distance_m.is_some() {
-            return Err(format!("{sentence}, which --distance-m needs").into());
-        }
-        print::note(sentence);
-    }
-    let mut progress = Bar::new(Some(count));
-    for (done, number) in played.take(count).enumerate() {
-        let pushed = match dataset.read(number, scan.slot()) {
-            Ok(geometry) => {
-                scan.geometry = geometry;
-                drive.push(number, &scan).map_err(|error| error.to_string())
+    let (mut poses, mut stamps_ns) = (Vec::new(), Vec::new());
+    for number in configuration.source.played(dataset.scans()).take(scans) {
+        // What cannot be read was named when the drive was read.
+        if let Ok(geometry) = dataset.read(number, scan.slot()) {
+            scan.geometry = geometry;
+            if let Ok(registered) = odometry.register(&scan.view(), &[]) {
+                stamps_ns.push(geometry.stamp_ns);
+                poses.push(registered.pose.motion);
             }
-            Err(error) => Err(error.to_string()),
-        };
-        if let Err(reason) = pushed {
-            progress.say(&format!("left out scan {number}: {reason}"));
         }
-        progress.scans(done as u64, done as u64, "read".to_owned());
     }
-    progress.finish();
-    Ok((drive, scan.geometry))
+    let stamp_ns = Some(stamps_ns);
+    let estimate = Trajectory { stamp_ns, poses };
+    Ok(judge(&estimate, truth)?.ate.rmse_m)
 }

@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 use gyre_configuration::terminal::inputs::ConfigArguments;
 use gyre_results::evaluate::EvaluateArguments;
 use gyre_tools::{
+    conformance::{ConformanceArguments, shadow::ShadowArguments},
     export::ExportArguments,
     maps::{localise::LocaliseArguments, map::MapArguments},
     masks::MasksArguments,
@@ -18,18 +19,16 @@ use gyre_tools::{
     },
     radar_server::RadarServerArguments,
     report::ReportArguments,
+    stress::StressArguments,
 };
 
 use crate::{
     arguments::{LinkEnd, Ros2Arguments, RunArguments, RunOptions},
     batch::BatchArguments,
     calibrate::CalibrateArguments,
-    conformance::ConformanceArguments,
     inspect::InspectArguments,
     record::RecordArguments,
-    shadow::ShadowArguments,
     simulate::SimulateArguments,
-    stress::StressArguments,
     watch::WatchArguments,
 };
 
@@ -63,13 +62,7 @@ pub enum Command {
     Batch(BatchArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
     #[command(hide = true, name = gyre_tools::batch::COMMAND)]
-    BatchDrive {
-        /// The process that has started it, and whose end also ends it.
-        #[arg(long)]
-        parent: i32,
-        #[command(flatten)]
-        run: RunArguments,
-    },
+    BatchDrive(RunArguments),
     /// Run the whole pipeline in the background. Returns when all its stages are there.
     Up(RunArguments),
     /// End a run in the background, and wait for its results.

@@ -1,60 +1,23 @@
 //! `gyre conformance`: tests whether a program keeps the contract of a stage.
 
-use std::{path::PathBuf, process::ExitCode, time::Duration};
+use std::process::ExitCode;
 
-use clap::{Args, builder::PossibleValuesParser};
 use gyre_configuration::{
     Configuration, describe_masks,
-    terminal::{Failure, INTERRUPTED, inputs::Inputs, own, print, seconds, words},
+    terminal::{Failure, INTERRUPTED, inputs::Inputs, own, print, words},
     with_stored_options,
 };
 use gyre_contract::{StageId, run::Scheduling};
-use gyre_tools::conformance::{Candidate, Demands, Report, Test, check};
+use gyre_tools::{
+    conformance::{Candidate, ConformanceArguments, Report, Test, check},
+    doctor::check_shared_memory,
+};
 use gyre_transport::{RunError, wake::Signals};
 
-use crate::{arguments::RunArguments, preflight, program, run::resolve};
-
-#[derive(Debug, Args)]
-pub struct ConformanceArguments {
-    /// The stage that the program replaces.
-    #[arg(value_parser = PossibleValuesParser::new(StageId::ALL.map(StageId::name)))]
-    pub stage: String,
-    /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved.
-    /// Default: the command of the stage in the configuration, else Gyre's own stage.
-    #[arg(long, value_name = "COMMAND")]
-    pub command: Option<String>,
-    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
-    #[arg(long, value_name = "FILE", conflicts_with = "command")]
-    pub python: Option<PathBuf>,
-    #[command(flatten)]
-    pub inputs: Inputs,
-    /// Scans to test with, 8 or more.
-    #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u16).range(8..=1000))]
-    pub scans: u16,
-    /// The results must equal the results of Gyre's own stage, to the bit.
-    #[arg(long)]
-    pub same_as_own: bool,
-    /// The 99th percentile of the work on an item must be at most this, ms; of fewer than a hundred
-    /// items the maximum. The first four do not count.
-    #[arg(long, value_name = "MS", value_parser = milliseconds)]
-    pub budget_ms: Option<Duration>,
-    /// Time for the program to open its topics, s.
-    #[arg(long, default_value = "30", value_name = "S", value_parser = seconds)]
-    pub start_timeout_s: Duration,
-    /// Time for the program to answer an item, or to refuse it, s.
-    #[arg(long, default_value = "10", value_name = "S", value_parser = seconds)]
-    pub patience_s: Duration,
-    /// Time for the program to exit after SIGTERM, s. A run gives it 2 s.
-    #[arg(long, default_value = "2", value_name = "S", value_parser = seconds)]
-    pub stop_timeout_s: Duration,
-    /// Print JSON instead of a table.
-    #[arg(long)]
-    pub json: bool,
-}
-
-fn milliseconds(text: &str) -> Result<Duration, &'static str> {
-    seconds(text).map(|seconds| seconds / 1000)
-}
+use crate::{
+    arguments::{RunArguments, resolve},
+    plan, preflight,
+};
 
 /// The shape of the program's messages matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
@@ -82,7 +45,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
     let command = command(arguments, &configuration, stage)?;
     preflight::check_open_files()?;
     let checked = preflight::check(&configuration, &mut preflight::ask)?;
-    preflight::check_shared_memory(&checked.footprint)?;
+    check_shared_memory(&checked.footprint)?;
     describe_masks(&configuration)?.iter().for_each(print::note);
     let folder = tempfile::Builder::new()
         .prefix("gyre-conformance-")
@@ -94,7 +57,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             stage,
             command,
             scheduling: Scheduling::default(),
-            manifest: checked.manifest(&configuration, folder.path(), program::digest(&own())?),
+            manifest: checked.manifest(&configuration, folder.path(), plan::digest(&own())?),
             configuration: configuration.to_toml()?,
         },
         stages: StageId::ALL
@@ -105,21 +68,10 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             Some(recording) => recording.listing.write(root),
             None => Ok(()),
         }),
-        demands: Demands {
-            start_timeout: arguments.start_timeout_s,
-            item_timeout: arguments.patience_s,
-            stop_timeout: arguments.stop_timeout_s,
-            same_as_own: arguments.same_as_own,
-            budget: arguments.budget_ms,
-        },
+        arguments,
     };
     let signals = Signals::install()?;
-    let mut observe = |what: &str| {
-        if !arguments.json {
-            print::note(format_args!("gyre: testing {what}"));
-        }
-    };
-    match check(&test, &signals, &mut observe) {
+    match check(&test, &signals) {
         Err(error) if matches!(error.downcast_ref(), Some(RunError::Stopped)) => Ok(None),
         report => report.map(Some),
     }

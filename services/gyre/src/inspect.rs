@@ -1,6 +1,6 @@
 //! `gyre inspect`: reports the contents of a dataset.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::path::PathBuf;
 
 use clap::Args;
 use gyre_configuration::terminal::{
@@ -22,7 +22,7 @@ pub struct InspectArguments {
     pub json: bool,
 }
 
-pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
+pub fn inspect(arguments: &InspectArguments) -> Result<(), Failure> {
     let trajectory = arguments.trajectory.as_deref().map(read_trajectory);
     let trajectory = trajectory.transpose()?;
     let given = arguments.inputs.given_recording()?;
@@ -40,8 +40,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let report =
         gyre_datasets::inspect_dataset(&path, dataset, &options, &logs, trajectory.as_ref());
     match arguments.json {
-        true => print::line(serde_json::to_string_pretty(&report)?)?,
-        false => print::values(report)?,
+        true => print::line(serde_json::to_string_pretty(&report)?),
+        false => print::values(report),
     }
-    Ok(ExitCode::SUCCESS)
 }

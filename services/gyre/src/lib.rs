@@ -16,15 +16,12 @@ pub mod link;
 pub mod notify;
 pub mod plan;
 pub mod preflight;
-pub mod program;
 pub mod progress;
 pub mod record;
 #[cfg(feature = "ros2")]
 pub mod ros2;
 pub mod run;
-pub mod shadow;
 pub mod simulate;
-pub mod split;
 pub mod stage;
 pub mod stress;
 mod waiting;
@@ -32,7 +29,7 @@ pub mod watch;
 
 use std::{path::PathBuf, process::ExitCode};
 
-use arguments::{RunArguments, RunOptions};
+use arguments::{RunArguments, RunOptions, results_folder};
 use cli::Command;
 use gyre_configuration::{
     Configuration, schema,
@@ -42,52 +39,56 @@ use gyre_contract::layout;
 
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     set_up_process(&command)?;
-    match command {
+    let done = match command {
         Command::New { what } => gyre_tools::new::new(&what),
-        Command::Stage { name, python } => Ok(stage::run(&name, python)),
-        Command::Guard => Ok(guard()),
-        Command::Run(arguments) => run::run(&arguments),
-        Command::Demo { set, options } => run::run(&of_demo(set, options)),
-        Command::Up(arguments) => gyre_tools::operate::up(&run::results_folder(&arguments)?),
+        Command::Up(arguments) => gyre_tools::operate::up(&results_folder(&arguments)?),
         Command::Down(run) => gyre_tools::operate::down(&run),
         Command::Ps(arguments) => gyre_tools::operate::ps(&arguments),
         Command::Logs(arguments) => gyre_tools::operate::logs(&arguments),
         Command::Top(arguments) => gyre_tools::operate::top(&arguments),
         Command::Restart(arguments) => gyre_tools::operate::restart(&arguments),
-        Command::Swap(arguments) => gyre_tools::operate::swap(&arguments),
         Command::Echo(arguments) => gyre_tools::operate::echo(&arguments),
         Command::Watch(arguments) => watch::watch(&arguments),
         #[cfg(feature = "ros2")]
         Command::Ros2(arguments) => ros2::publish(&arguments),
         #[cfg(not(feature = "ros2"))]
         Command::Ros2(_) => Err(features::absent("ROS 2").into()),
-        Command::Shadow(arguments) => shadow::shadow(&arguments),
-        Command::Batch(arguments) => batch::batch(&arguments),
-        Command::BatchDrive { parent, run } => batch::drive(parent, &run),
-        Command::Stress(arguments) => stress::stress(&arguments),
-        Command::StressHelper { words } => stress::help(&words),
-        Command::Record(arguments) => record::record(&arguments),
-        #[cfg(feature = "link")]
-        Command::Link { end } => link::link(&end),
+        Command::StressHelper { words } => gyre_tools::stress::helper::help(&words),
         #[cfg(not(feature = "link"))]
         Command::Link { .. } => Err(features::absent(features::LINK).into()),
-        Command::Doctor => doctor(),
         Command::RadarServer(arguments) => gyre_tools::radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Report(arguments) => gyre_tools::report::report(&arguments),
-        Command::Evaluate(arguments) => gyre_results::evaluate::evaluate(&arguments),
         Command::Map(arguments) => gyre_tools::maps::map::map(&arguments),
         Command::Localise(arguments) => gyre_tools::maps::localise::localise(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
         Command::Masks(arguments) => gyre_tools::masks::masks(&arguments),
         Command::Export(arguments) => gyre_tools::export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
-        Command::Conformance(arguments) => conformance::conformance(&arguments),
-        Command::Config(arguments) => gyre_configuration::terminal::inputs::config(&arguments),
-        Command::Schema { markdown, messages } => shown(&schema(markdown, messages)?),
-        Command::Completions { shell } => shown(completions(shell).trim_end()),
+        Command::Schema { markdown, messages } => print::line(schema(markdown, messages)?),
+        Command::Completions { shell } => print::line(completions(shell).trim_end()),
         Command::Man { folder } => write_manual(&folder),
-    }
+        // The others have exit codes of their own.
+        Command::Stage { name, python } => return Ok(stage::run(&name, python)),
+        Command::Guard => return Ok(guard()),
+        Command::Run(arguments) => return run::run(&arguments),
+        Command::Demo { set, options } => return run::run(&of_demo(set, options)),
+        Command::Swap(arguments) => return gyre_tools::operate::swap(&arguments),
+        Command::Shadow(arguments) => return gyre_tools::conformance::shadow::shadow(&arguments),
+        Command::Batch(arguments) => return batch::batch(&arguments),
+        Command::BatchDrive(arguments) => return batch::drive(&arguments),
+        Command::Stress(arguments) => return stress::stress(&arguments),
+        Command::Record(arguments) => return record::record(&arguments),
+        #[cfg(feature = "link")]
+        Command::Link { end } => return link::link(&end),
+        Command::Doctor => return doctor(),
+        Command::Evaluate(arguments) => return gyre_results::evaluate::evaluate(&arguments),
+        Command::Conformance(arguments) => return conformance::conformance(&arguments),
+        Command::Config(arguments) => {
+            return gyre_configuration::terminal::inputs::config(&arguments);
+        }
+    };
+    done.map(|()| ExitCode::SUCCESS)
 }
 
 /// The files of a command are its user's alone: all but a simulated recording. The umask of a child
@@ -125,21 +126,15 @@ fn schema(markdown: bool, messages: bool) -> Result<String, Failure> {
     })
 }
 
-fn shown(text: &str) -> Result<ExitCode, Failure> {
-    print::line(text)?;
-    Ok(ExitCode::SUCCESS)
-}
-
 fn completions(shell: clap_complete::Shell) -> String {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut cli::command(), "gyre", &mut text);
     String::from_utf8_lossy(&text).into_owned()
 }
 
-fn write_manual(folder: &std::path::Path) -> Result<ExitCode, Failure> {
+fn write_manual(folder: &std::path::Path) -> Result<(), Failure> {
     gyre_storage::create_folder(folder)?;
-    clap_mangen::generate_to(cli::command(), folder)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(clap_mangen::generate_to(cli::command(), folder)?)
 }
 
 /// Checks this machine for missing requirements of a run of the default configuration, whose scans

@@ -6,12 +6,10 @@ use gyre_configuration::terminal::{Failure, INTERRUPTED, execute_again, own, pri
 use gyre_contract::{Footprint, run::LinkConfig};
 use gyre_link::ONE_THREAD;
 use gyre_results::Out;
+use gyre_tools::doctor::check_shared_memory;
 use gyre_transport::{run::sweep, wake::Signals};
 
-use crate::{
-    arguments::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
-    preflight,
-};
+use crate::arguments::{LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 
 pub fn link(end: &LinkEnd) -> Result<ExitCode, Failure> {
     set_environment()?;
@@ -45,7 +43,7 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::from(INTERRUPTED));
     };
     let manifest = seen.manifest(out.path());
-    preflight::check_shared_memory(&Footprint::new(&manifest.window, &manifest.limits))?;
+    check_shared_memory(&Footprint::new(&manifest.window, &manifest.limits))?;
     print::note(format_args!(
         "gyre link: the run {} is here as {}",
         link.name,

@@ -11,7 +11,7 @@ use gyre_configuration::{
 };
 use gyre_contract::{
     Footprint, Limits, StageId, Window,
-    run::{MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind},
+    run::{LinkConfig, MOST_OPEN_FILES, Mode, PlayedFrom, Side, SourceKind},
 };
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
 use gyre_geometry::samples::{MAX_SAMPLES, SensorKind};
@@ -21,11 +21,9 @@ use gyre_stages::{
     live_radar::{Settings, Sizes},
     radar_replay::{Listing, Player},
 };
-use gyre_tools::maps::localise::searched_map;
-use gyre_transport::{Manifest, run::free_shared_memory};
+use gyre_tools::maps::localise::localiser;
+use gyre_transport::Manifest;
 use rustix::process::{Resource, getrlimit};
-
-use crate::split;
 
 pub struct Preflight {
     pub scans: Scans,
@@ -59,7 +57,7 @@ pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
 
 /// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
 pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflight, Failure> {
-    split::check(configuration)?;
+    check_link(&configuration.link)?;
     let masker = Masker::new(
         &configuration.odometry.raster,
         &configuration.odometry.points,
@@ -74,11 +72,11 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
     }
     check_addresses(&[&configuration.gnss])?;
     if configuration.slam.is_localised() {
-        searched_map::open(&configuration.slam.map, configuration)?;
+        localiser(&configuration.slam.map, configuration)?;
     }
     let scans = match configuration.is_radar() {
         true => Scans::of_radar(configuration, ask)?,
-        false if configuration.is_side(Side::Base) => Scans::of_base(configuration)?,
+        false if configuration.is_side(Side::Base) => Scans::of_base(&configuration.link)?,
         false if configuration.source.from != PlayedFrom::Scan => {
             Scans::of_messages(configuration)?
         }
@@ -189,12 +187,22 @@ impl Scans {
         })
     }
 
-    /// Returns the properties of the robot's scans, which a base asks for before the run.
-    fn of_base(configuration: &Configuration) -> Result<Self, Failure> {
+    /// Returns the properties of the robot's scans, which a base asks for before the run if scans
+    /// are sent.
+    fn of_base(link: &LinkConfig) -> Result<Self, Failure> {
         Ok(Self {
-            count: None,
             period_ns: DEFAULT_TURN_NS,
-            bytes: split::scan_bytes(&configuration.link)?,
+            bytes: match link.cut {
+                #[cfg(feature = "link")]
+                PlayedFrom::Scan => {
+                    let name = &link.name;
+                    print::note(format_args!(
+                        "link {name}: waiting for the robot, which knows how large its scans are"
+                    ));
+                    gyre_link::ask_robot(link)?
+                }
+                _ => 0,
+            },
             ..Self::default()
         })
     }
@@ -231,11 +239,25 @@ impl Scans {
     }
 }
 
+/// Checks that the other side of a split run can be reached as it is configured.
+fn check_link(link: &LinkConfig) -> Result<(), Failure> {
+    if link.side.is_none() {
+        return Ok(());
+    }
+    #[cfg(not(feature = "link"))]
+    return Err(crate::features::absent(crate::features::LINK).into());
+    #[cfg(feature = "link")]
+    gyre_link::check(link).map_err(|error| format!("[link]: {error}").into())
+}
+
 pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
         #[cfg(feature = "ros2")]
-        SourceKind::Ros2 => crate::ros2::ask(source, options),
+        SourceKind::Ros2 => {
+            use gyre_ros2_bridge::source::{Settings, ask};
+            Ok(ask(&Settings::of(source, options)?)?)
+        }
         #[cfg(not(feature = "ros2"))]
         SourceKind::Ros2 => Err(crate::features::absent("ROS 2").into()),
         _ => Ok(gyre_stages::live_radar::ask(&Settings::of(
@@ -254,20 +276,6 @@ pub fn check_open_files() -> Result<(), Failure> {
     match getrlimit(Resource::Nofile).current {
         Some(limit) if limit < MOST_OPEN_FILES => Err(format!(
             "a process may have {limit} open files, but one of a run has up to {MOST_OPEN_FILES}: raise the limit with `ulimit -n 1024`"
-        )
-        .into()),
-        _ => Ok(()),
-    }
-}
-
-/// Acquire the run's root first, which removes the memory of killed runs.
-pub fn check_shared_memory(footprint: &Footprint) -> Result<(), Failure> {
-    let free = free_shared_memory();
-    let free = free.map_err(|error| format!("cannot use shared memory at /dev/shm: {error}"))?;
-    match free {
-        Some(free) if free < footprint.total() as u64 => Err(format!(
-            "shared memory at /dev/shm has {:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), or lower run.window or raster.n",
-            free as f64 / 1e6
         )
         .into()),
         _ => Ok(()),

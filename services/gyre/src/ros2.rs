@@ -1,24 +1,20 @@
-//! ROS 2: `gyre ros2`, and a radar behind Navtech's driver as a source.
+//! `gyre ros2`: publishes a running run to ROS 2.
 
-use std::{path::Path, process::ExitCode};
+use std::path::Path;
 
 use gyre_client::Run;
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
 };
-use gyre_contract::run::{SourceConfig, StageCounters};
-use gyre_datasets::DatasetOptions;
 use gyre_results::{absolute, map_options};
-use gyre_ros2_bridge::{Bridge, MapSettings, Settings, source};
+use gyre_ros2_bridge::{Bridge, MapSettings, Settings};
 use gyre_ros2_messages::Domain;
-use gyre_stage::Launch;
-use gyre_stages::live_radar::Sizes;
-use gyre_transport::{RunError, wake::Signals};
+use gyre_transport::wake::Signals;
 
 use crate::arguments::Ros2Arguments;
 
-pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
+pub fn publish(arguments: &Ros2Arguments) -> Result<(), Failure> {
     // A wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
@@ -47,7 +43,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     bridge.publish(&signals, |sentence| {
         print::note(format_args!("gyre: {sentence}"));
     })?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn map_settings(out: &Path) -> Result<MapSettings, String> {
@@ -58,18 +54,4 @@ fn map_settings(out: &Path) -> Result<MapSettings, String> {
         options: map_options(&configuration),
         estimator: estimator.ok_or("slam.kind is none")?,
     })
-}
-
-pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Failure> {
-    let settings = source::Settings::of(source, options)?;
-    Ok(source::ask(&settings)?)
-}
-
-pub fn receive(
-    launch: &Launch,
-    source: &SourceConfig,
-    options: &DatasetOptions,
-) -> Result<StageCounters, RunError> {
-    let settings = source::Settings::of(source, options).map_err(RunError::Input)?;
-    source::run(launch, settings)
 }

@@ -1,10 +1,7 @@
 //! `gyre run`: prepares a run, supervises it, writes its results.
 
-mod resolve;
-
 use std::{
     env,
-    path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -21,7 +18,7 @@ use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
-use gyre_tools::operate::detach_if_asked;
+use gyre_tools::{doctor::check_shared_memory, operate::detach_if_asked};
 use gyre_transport::{
     Manifest, RunError,
     run::{RunRoot, sweep},
@@ -30,17 +27,14 @@ use gyre_transport::{
 };
 
 use crate::{
-    arguments::RunArguments,
+    arguments::{RunArguments, resolve, results_folder},
     earlier::{self, Begun, Earlier},
     notify::Notifier,
     plan,
     preflight::{self, Preflight},
-    program,
     progress::Progress,
     simulate, waiting,
 };
-
-pub use resolve::resolve;
 
 const RECORDING: &str = "recording";
 
@@ -48,6 +42,9 @@ const RECORDING: &str = "recording";
 /// resumed; if it only lacks results, the results are written.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     detach_if_asked();
+    if !arguments.options.ends_with_parent()? {
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
     let configuration = resolve(arguments)?;
     #[cfg(feature = "link")]
     if configuration.link.side.is_some() {
@@ -73,7 +70,7 @@ pub(crate) fn compute(
     // memory itself.
     sweep();
     place_recording(&mut configuration, &out);
-    let programs = program::now(&configuration)?;
+    let programs = plan::programs(&configuration)?;
     match Earlier::of(&out, &configuration, &programs, fresh)? {
         Earlier::Foreign(reason) if !earlier::is_closed(&configuration) => Err(reason),
         Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun, form),
@@ -90,25 +87,6 @@ pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
     if configuration.stored().is_some() {
         configuration.source.data = out.join(RECORDING);
     }
-}
-
-pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
-    if let Some(out) = &arguments.options.out {
-        return Ok(out.clone());
-    }
-    let given = arguments.given()?;
-    let data = given.data.and_then(|data| data.canonicalize().ok());
-    let name = match &given.configuration {
-        Some(file) => file.file_stem(),
-        None if given.radar.is_some() || arguments.ros2.is_some() => Some("radar".as_ref()),
-        None => data.as_deref().and_then(|data| {
-            match gyre_recording::is_recording(data) || data.is_file() {
-                true => data.file_stem(),
-                false => data.file_name(),
-            }
-        }),
-    };
-    Ok(Path::new("out").join(name.unwrap_or_default()))
 }
 
 /// The inputs of a run that its configuration does not have.
@@ -183,7 +161,7 @@ fn play(
         out = earlier::close(out, reason)?;
     }
     let root = RunRoot::acquire(out.path(), &signals)?;
-    preflight::check_shared_memory(&checked.footprint)?;
+    check_shared_memory(&checked.footprint)?;
     prepare(configuration, &ready, &out, unfinished)?;
     let plan = plan_in(&root, &ready, programs, &out)?;
 

@@ -3,7 +3,6 @@
 use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
-    process::ExitCode,
     time::Instant,
 };
 
@@ -47,7 +46,7 @@ pub struct SimulateArguments {
     pub set: Vec<String>,
 }
 
-pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
+pub fn simulate(arguments: &SimulateArguments) -> Result<(), Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;
     let configuration = configuration(arguments.configuration.as_deref(), &overrides)?;
@@ -72,8 +71,7 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
         summary.scans,
         summary.path_m,
         summary.duration_s,
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    ))
 }
 
 fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {

@@ -29,7 +29,7 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::program;
+use crate::plan;
 
 type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, RunError>>;
 
@@ -99,7 +99,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), RunError> {
     if file(&path).is_some_and(|own| file(&supervisor) == Some(own)) {
         return Ok(());
     }
-    let build = program::digest(&path).map_err(|source| RunError::File { path, source })?;
+    let build = plan::digest(&path).map_err(|source| RunError::File { path, source })?;
     match build == manifest.build {
         true => Ok(()),
         false => Err(RunError::Input(
@@ -138,7 +138,9 @@ fn play(launch: &Launch) -> Result<StageCounters, RunError> {
         }
         #[cfg(feature = "ros2")]
         SourceKind::Ros2 => {
-            return crate::ros2::receive(launch, &source, &launch.section("dataset")?);
+            use gyre_ros2_bridge::source::{self, Settings};
+            let settings = Settings::of(&source, &launch.section("dataset")?);
+            return source::run(launch, settings.map_err(RunError::Input)?);
         }
         // A build without ROS 2 refuses to begin a run from there.
         _ => {}

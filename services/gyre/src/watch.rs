@@ -1,6 +1,6 @@
 //! `gyre watch`: shows a running run in a browser, and to Prometheus and Foxglove.
 
-use std::{net::SocketAddr, path::PathBuf, process::ExitCode};
+use std::{net::SocketAddr, path::PathBuf};
 
 use clap::Args;
 use gyre_client::Run;
@@ -34,7 +34,7 @@ pub struct WatchArguments {
 }
 
 /// Serves the page until a signal arrives. From another machine it is read with a token alone.
-pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
+pub fn watch(arguments: &WatchArguments) -> Result<(), Failure> {
     // Before the server starts, so that a wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
@@ -66,8 +66,7 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     }
     let signals = Signals::install()?;
     let shown = Server { page, foxglove }.show(out, earlier::is_complete, &signals);
-    shown.map_err(|error| format!("cannot serve: {error}"))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(shown.map_err(|error| format!("cannot serve: {error}"))?)
 }
 
 fn token(arguments: &WatchArguments) -> Result<Option<Token>, Failure> {

@@ -98,6 +98,7 @@ fn witness(witnessed: Option<Witnessed>) -> WitnessRecord {
             Verdict::Refused => verdict::REFUSED,
         },
         measured: of.measured,
+        registered: of.registered,
         scale: of.scale,
         scale_sigma: of.scale_sigma,
         bias: of.bias,

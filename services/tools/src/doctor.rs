@@ -39,6 +39,20 @@ pub fn doctor(footprint: &Footprint) -> Result<ExitCode, Failure> {
     })
 }
 
+/// Acquire the run's root first, which removes the memory of killed runs.
+pub fn check_shared_memory(footprint: &Footprint) -> Result<(), Failure> {
+    let free = free_shared_memory();
+    let free = free.map_err(|error| format!("cannot use shared memory at /dev/shm: {error}"))?;
+    match free {
+        Some(free) if free < footprint.total() as u64 => Err(format!(
+            "shared memory at /dev/shm has {:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), or lower run.window or raster.n",
+            free as f64 / 1e6
+        )
+        .into()),
+        _ => Ok(()),
+    }
+}
+
 fn shared_memory(footprint: &Footprint) -> Finding {
     let needed = footprint.total() as u64;
     let free = match free_shared_memory() {

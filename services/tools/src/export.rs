@@ -1,32 +1,92 @@
 //! `gyre export`: the results of a run, and its scans, as a bag of ROS 2; or the repaired recording
 //! of a run, in RADIATE's format (`repaired`).
 
-mod arguments;
 mod repaired;
 mod scans;
 mod source;
 
-use std::{path::Path, process::ExitCode};
+use std::path::{Path, PathBuf};
 
+use clap::{Args, ValueEnum};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_recording::bags::{BagWriter, Kept, Topic};
 use gyre_ros2_messages::{
-    Vehicle, nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
-    visualization_msgs::MarkerArray,
+    Vehicle, frames::Frames, nav_msgs::Odometry, objects, tf2_msgs::TFMessage,
+    vision_msgs::Detection3DArray, visualization_msgs::MarkerArray,
 };
 
-pub use arguments::{ExportArguments, FrameArguments, ScanForm};
+pub use repaired::write_grey;
 use scans::ScanWriter;
 use source::{Place, Source};
 
-pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
+#[derive(Debug, Args)]
+pub struct ExportArguments {
+    /// The source: the folder of a run's results, a recording of a run, NAME.mcap, or a dataset.
+    pub source: PathBuf,
+    /// The bag to write: a folder, or one file if its name ends in .mcap.
+    #[arg(long, value_name = "BAG", required_unless_present = "format")]
+    pub mcap: Option<PathBuf>,
+    /// Write the scans of a run in the form of its dataset instead, with each azimuth that was lost
+    /// put back where the run has found it missing.
+    #[arg(long, value_parser = ["radiate"], requires = "out", conflicts_with_all = ["mcap", "scans", "frames", "mounting"])]
+    pub format: Option<String>,
+    /// The folder to write such a dataset to: a new or an empty one.
+    #[arg(long, value_name = "FOLDER", requires = "format")]
+    pub out: Option<PathBuf>,
+    /// The form of the scans: as whole turns, azimuth by azimuth as the radar sends them, both, or
+    /// not.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "b-scan")]
+    pub scans: Vec<ScanForm>,
+    #[command(flatten)]
+    pub frames: FrameArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct FrameArguments {
+    /// Names of the frames: of the map, of odometry, of the vehicle and of the radar.
+    #[arg(
+        long,
+        value_name = "MAP,ODOM,BASE,RADAR",
+        default_value = "map,odom,base_link,radar"
+    )]
+    pub frames: Frames,
+    /// Where the radar is on the vehicle: m forward, m to the left, degrees counter-clockwise.
+    #[arg(
+        long,
+        value_name = "X,Y,YAW",
+        default_value = "0,0,0",
+        allow_hyphen_values = true
+    )]
+    pub mounting: String,
+}
+
+impl FrameArguments {
+    pub fn vehicle(&self) -> Result<Vehicle, String> {
+        Ok(Vehicle {
+            frames: self.frames.clone(),
+            mounting: self.mounting.parse()?,
+        })
+    }
+}
+
+/// The form of the scans in the bag.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ScanForm {
+    /// A message a turn: navtech_msgs/msg/RadarBScanMsg.
+    BScan,
+    /// A message an azimuth: navtech_msgs/msg/RadarFftDataMsg.
+    Fft,
+    /// No scans.
+    None,
+}
+
+pub fn export(arguments: &ExportArguments) -> Result<(), Failure> {
     let mut source = Source::open(&arguments.source)?;
     match (&arguments.mcap, &arguments.out) {
-        (Some(bag), _) => write_bag(&mut source, bag, arguments)?,
-        (None, Some(out)) => repaired::write(&source, out)?,
-        (None, None) => return Err("name what to write: --mcap BAG".into()),
+        (Some(bag), _) => write_bag(&mut source, bag, arguments),
+        (None, Some(out)) => repaired::write(&source, out),
+        (None, None) => Err("name what to write: --mcap BAG".into()),
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> Result<(), Failure> {

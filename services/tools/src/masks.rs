@@ -1,11 +1,9 @@
 //! `gyre masks`: draws the mask's effect on scans.
 
 mod drawing;
-mod inspection;
 mod inspector;
-pub mod picture;
 
-use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use clap::Args;
 use drawing::Canvas;
@@ -14,7 +12,7 @@ use gyre_configuration::{
     terminal::{Failure, inputs::Inputs, print},
 };
 use gyre_results::Content;
-use inspector::MaskInspector;
+use inspector::{HEADER, MaskInspector};
 
 /// Number of scans that are drawn by default, and maximum on the overview.
 const FEW: usize = 8;
@@ -39,7 +37,7 @@ pub struct MasksArguments {
     pub json: bool,
 }
 
-pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
+pub fn masks(arguments: &MasksArguments) -> Result<(), Failure> {
     let configuration = arguments.inputs.configuration()?;
     let played = gyre_configuration::open(&configuration)?;
     let chosen = choose(
@@ -55,7 +53,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     Content::MASKS.require_place(out)?;
     gyre_storage::create_folder(out)?;
     if !arguments.json {
-        print::line(inspection::HEADER)?;
+        print::line(HEADER)?;
     }
     let (mut overview, apart) = (Vec::new(), chosen.len().div_ceil(FEW));
     let mut figures = Vec::new();
@@ -81,7 +79,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     if arguments.json {
         print::line(serde_json::to_string_pretty(&figures)?)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn choose(

@@ -1,9 +1,6 @@
 //! `gyre new`: begins a project.
 
-use std::{
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, builder::PossibleValuesParser};
 use gyre_configuration::terminal::{Failure, print};
@@ -35,7 +32,7 @@ pub struct StageArguments {
     pub gyre: Option<PathBuf>,
 }
 
-pub fn new(what: &New) -> Result<ExitCode, Failure> {
+pub fn new(what: &New) -> Result<(), Failure> {
     let New::Stage(arguments) = what;
     let stage = arguments.stage.as_str();
     let default = || PathBuf::from(format!("my-{stage}"));
@@ -61,8 +58,7 @@ pub fn new(what: &New) -> Result<ExitCode, Failure> {
     let folder = folder.display();
     print::line(format_args!(
         "{folder} has been written: {folder}/README.md lists its commands"
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    ))
 }
 
 macro_rules! template {

@@ -1,22 +1,26 @@
 //! `gyre report`: one page about a run, or about several runs and the trajectories of other
 //! programs beside each other. The page has all its pictures in it and needs no network.
 
-mod html;
 mod page;
-mod subject;
 
 use std::{
+    fs,
     path::{Path, PathBuf},
-    process::{Command, ExitCode, Stdio},
+    process::{Command, Stdio},
 };
 
 use clap::Args;
 use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::read_trajectory;
-use gyre_results::{evaluate::truth_of_run, write_page};
+use gyre_geometry::Pose;
+use gyre_radar::Trajectory;
+use gyre_results::{
+    SUMMARY, evaluate::truth_of_run, evaluation::Evaluation, judgement::judge, require_results,
+    write_page,
+};
+use serde_json::{Value, json};
 
 use page::page;
-use subject::Subject;
 
 #[derive(Debug, Args)]
 pub struct ReportArguments {
@@ -36,7 +40,7 @@ pub struct ReportArguments {
     pub open: bool,
 }
 
-pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
+pub fn report(arguments: &ReportArguments) -> Result<(), Failure> {
     let truth = match &arguments.ground_truth {
         Some(truth) => Some(truth.clone()),
         None => truth_of(&arguments.subjects),
@@ -49,10 +53,10 @@ pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
     let to = arguments.to.clone().unwrap_or_else(default);
     write_page(&to, &page(&subjects?)?, "<p>by gyre report, ")?;
     print::line(to.display())?;
-    if arguments.open {
-        open(&to)?;
+    match arguments.open {
+        true => open(&to),
+        false => Ok(()),
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Returns the runs and trajectories, each run with the trajectory that its loops have corrected.
@@ -92,4 +96,96 @@ fn open(page: &Path) -> Result<(), Failure> {
     };
     let page = page.display();
     Err(format!("cannot open a browser by xdg-open ({reason}): open {page} yourself").into())
+}
+
+/// A run or a trajectory that a page is about.
+struct Subject {
+    name: String,
+    /// The errors, where there is a ground truth that fits.
+    evaluation: Option<Evaluation>,
+    trajectory: Trajectory,
+    /// The figures, as `summary.json` has them; the errors are those against the common ground
+    /// truth.
+    figures: Value,
+    run: Option<Run>,
+}
+
+struct Run {
+    folder: PathBuf,
+    summary: Value,
+    configuration: String,
+}
+
+impl Subject {
+    fn read(path: &Path, truth: Option<&Trajectory>) -> Result<Self, Failure> {
+        let run = path.is_dir().then(|| Run::read(path)).transpose()?;
+        let file = match &run {
+            Some(run) => run.folder.join("trajectory.tum"),
+            None => path.to_owned(),
+        };
+        let trajectory = read_trajectory(&file)?;
+        let evaluation = truth.and_then(|truth| {
+            judge(&trajectory, truth)
+                .inspect_err(|reason| {
+                    print::note(format_args!(
+                        "{} is not evaluated: {reason}",
+                        file.display()
+                    ))
+                })
+                .ok()
+        });
+        let duration_s = |(first_ns, last_ns): (i64, i64)| (last_ns - first_ns) as f64 * 1e-9;
+        let summary = run.as_ref().map(|run| run.summary.clone());
+        let summary = summary.filter(Value::is_object);
+        let mut figures = summary.unwrap_or_else(|| json!({}));
+        figures["path_m"] = json!(trajectory.path_length_m());
+        figures["duration_s"] = json!(trajectory.span_ns().map(duration_s));
+        figures["processed"] = json!(trajectory.poses.len());
+        figures["evaluation"] = serde_json::to_value(&evaluation)?;
+        Ok(Self {
+            name: path.display().to_string(),
+            evaluation,
+            trajectory,
+            figures,
+            run,
+        })
+    }
+
+    /// Returns the poses to draw: in the frame of the ground truth, or as they are.
+    fn drawn(&self) -> Vec<Pose> {
+        match &self.evaluation {
+            Some(evaluation) => {
+                let aligned = evaluation.ate.truth_from_estimate;
+                let poses = evaluation.matched.estimate().iter();
+                poses.map(|pose| aligned * pose).collect()
+            }
+            None => self.trajectory.poses.clone(),
+        }
+    }
+}
+
+impl Run {
+    fn read(folder: &Path) -> Result<Self, Failure> {
+        require_results(folder)?;
+        let text = |name: &str| {
+            let path = folder.join(name);
+            fs::read_to_string(&path).map_err(|error| {
+                let (folder, path) = (folder.display(), path.display());
+                format!("{folder} has no complete results of a run: cannot read {path}: {error}")
+            })
+        };
+        Ok(Self {
+            folder: folder.to_owned(),
+            summary: serde_json::from_str(&text(SUMMARY)?)?,
+            configuration: text("config.toml")?,
+        })
+    }
+
+    fn number(&self, path: &str) -> Option<f64> {
+        self.summary.pointer(path)?.as_f64()
+    }
+
+    fn picture(&self, name: &str) -> Option<Vec<u8>> {
+        fs::read(self.folder.join(name)).ok()
+    }
 }

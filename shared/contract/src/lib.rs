@@ -7,6 +7,7 @@
 mod basis;
 pub mod control;
 mod follower;
+mod gnss;
 mod intake;
 mod item;
 pub mod layout;
@@ -26,6 +27,7 @@ pub mod wire;
 
 pub use basis::{Basis, WitnessCounts};
 pub use follower::{CorrectionHeader, FixHeader, LoopHeader, fix_status};
+pub use gnss::GnssHeader;
 pub use gyre_geometry::{
     named,
     samples::{Measures, Witness},
@@ -43,6 +45,6 @@ pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::ScanHeader;
 pub use stages::{StageTopics, composed};
 pub use topics::{
-    Correction, Fix, Footprint, GivenAnew, Intake, Loop, Masked, Motion, NumberedBy, Objects, Pose,
-    Refined, Rotation, Scan, all, named as topic_named, topic, topics,
+    Correction, Fix, Footprint, GivenAnew, Gnss, Intake, Loop, Masked, Motion, NumberedBy, Objects,
+    Pose, Refined, Rotation, Scan, all, named as topic_named, topic, topics,
 };

@@ -34,7 +34,7 @@ wire! {
 
     /// The pose of this scan's frame in the previous scan's frame, with its covariance: x forward,
     /// y to the left, yaw counter-clockwise.
-    pub struct MotionEstimate = "gyre_motion_estimate_v9" {
+    pub struct MotionEstimate = "gyre_motion_estimate_v10" {
         pub x_m: f64 [WIDTHS],
         pub y_m: f64 [WIDTHS],
         pub yaw_rad: f64 [Bounds::HalfTurn],
@@ -56,7 +56,7 @@ wire! {
         pub refinement: RefinementRecord,
     }
 
-    pub struct MotionHeader = "gyre_motion_header_v12" {
+    pub struct MotionHeader = "gyre_motion_header_v13" {
         pub item: Item,
         /// The motion; all zero where the chain starts.
         pub motion: MotionEstimate,

@@ -13,7 +13,7 @@ use crate::{
 wire! {
     /// A pose in the frame of the first scan: x forward, y to the left, yaw counter-clockwise, in
     /// (-pi, pi].
-    pub struct PoseHeader = "gyre_pose_header_v12" {
+    pub struct PoseHeader = "gyre_pose_header_v13" {
         pub item: Item,
         pub motion: MotionEstimate,
         pub x_m: f64 [REACH],

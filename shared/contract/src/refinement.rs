@@ -44,12 +44,14 @@ codes! {
 
 wire! {
     /// A sensor beside the radar in a motion; all zero if it has not measured the motion.
-    pub struct WitnessRecord = "gyre_witness_record_v1" {
+    pub struct WitnessRecord = "gyre_witness_record_v2" {
         /// See [`verdict`].
         pub verdict: u64 [Bounds::Codes(verdict::NAMES)],
         /// The turn (rad) or the distance (m) since the previous scan that it measured, or the
         /// heading (rad).
         pub measured: f64 [Bounds::Finite],
+        /// The same turn or distance by the registration alone; zero without a match.
+        pub registered: f64 [Bounds::Finite],
         /// The true value over the measured one, after the scan.
         pub scale: f64 [Bounds::Finite],
         pub scale_sigma: f64 [Bounds::Finite],
@@ -59,7 +61,7 @@ wire! {
     }
 
     /// The result of a refinement; all zero without one.
-    pub struct RefinementRecord = "gyre_refinement_v7" {
+    pub struct RefinementRecord = "gyre_refinement_v8" {
         /// See [`outcome`].
         pub outcome: u32 [Bounds::Codes(outcome::NAMES)],
         /// The initial guess of the accepted motion: see [`initial_guess`].

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::{
     follower::{CorrectionHeader, FixHeader, LoopHeader},
+    gnss::GnssHeader,
     intake::IntakeHeader,
     item::{FollowerId, StageId},
     limits::{History, Limits, TopicSizes, Window},
@@ -88,6 +89,16 @@ topics! {
     Intake = "intake" {
         IntakeHeader, FloatBlock, by Sender::Stage(&[StageId::RadarReplay]), for [], Latest,
         is [Recorded Linked Replaces]
+    }
+    /// The fixes of a live GNSS receiver. The trajectory logs them; odometry does not use them.
+    Gnss = "gnss" {
+        GnssHeader, FloatBlock, by Sender::Stage(&[StageId::RadarReplay]), for ["trajectory"],
+        Latest, is [],
+        // Ten seconds of 20 fixes: a trajectory that is restarted, or busy, loses none.
+        sizes: |window, sizes| match window.slam {
+            true => TopicSizes { history: 200, buffer: 200, ..sizes },
+            false => sizes,
+        }
     }
     /// Masked rasters and sparse points, and what other sensors have measured. Payload:
     /// one raster if the mask takes one scan, or two (this scan and the previous one, both masked
@@ -283,13 +294,13 @@ mod tests {
         let (mut slam, mut with_objects) = (WINDOW, WINDOW);
         (slam.slam, with_objects.objects) = (true, true);
         assert_eq!(names(&WINDOW).last(), Some(&"pose"));
-        assert_eq!(names(&slam)[7..], ["loop", "correction"]);
+        assert_eq!(names(&slam)[8..], ["loop", "correction"]);
         let with_map = Window {
             localises: true,
             ..slam
         };
-        assert_eq!(names(&with_map)[7..], ["loop", "correction", "fix"]);
-        assert_eq!(names(&with_objects)[7..], ["objects"]);
+        assert_eq!(names(&with_map)[8..], ["loop", "correction", "fix"]);
+        assert_eq!(names(&with_objects)[8..], ["objects"]);
         assert_eq!(Masked::sizes(&with_objects), Masked::sizes(&slam));
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();
         assert_eq!(added, 3);

@@ -169,6 +169,15 @@ impl OwnedScan {
         }
     }
 
+    /// Returns a scan of this geometry without power, whose azimuths are all measured.
+    pub fn of(geometry: SweepGeometry) -> Self {
+        let azimuths = geometry.azimuths;
+        let bytes = azimuths * geometry.stride;
+        let mut scan = Self::with_limits(ScanLimits { bytes, azimuths });
+        (scan.geometry, scan.flags) = (geometry, vec![flag::MEASURED; azimuths]);
+        scan
+    }
+
     pub fn slot(&mut self) -> ScanSlot<'_> {
         ScanSlot {
             bytes: &mut self.bytes,

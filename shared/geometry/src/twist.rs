@@ -12,6 +12,17 @@ pub struct Twist {
     pub yaw_rate_radps: f64,
 }
 
+impl From<[f64; 3]> for Twist {
+    /// From x and y, m/s, and yaw, rad/s.
+    fn from([vx_mps, vy_mps, yaw_rate_radps]: [f64; 3]) -> Self {
+        Self {
+            vx_mps,
+            vy_mps,
+            yaw_rate_radps,
+        }
+    }
+}
+
 impl Twist {
     /// Returns the twist of `motion` (the pose of the later frame in the earlier one) over `dt_s`
     /// seconds: the logarithm divided by the time. It is not finite if `dt_s` is zero or `motion`
@@ -23,11 +34,7 @@ impl Twist {
         // of the arc.
         let stretch = 1.0 / sinc(half);
         let arc = UnitComplex::new(-half) * motion.translation.vector * (stretch / dt_s);
-        Self {
-            vx_mps: arc.x,
-            vy_mps: arc.y,
-            yaw_rate_radps: yaw / dt_s,
-        }
+        [arc.x, arc.y, yaw / dt_s].into()
     }
 
     /// Returns the pose after `t_s` seconds in the frame at time 0: exp(twist t). Negative times

@@ -150,10 +150,7 @@ mod tests {
     #[test]
     fn an_odometry_fits_where_all_its_motions_end_at_poses_but_for_rounding() {
         let stamps = vec![1_000_000_000, 1_250_000_400, 1_500_000_000];
-        let trajectory = Trajectory {
-            stamp_ns: Some(stamps),
-            poses: Vec::new(),
-        };
+        let trajectory = Trajectory::timed(stamps, Vec::new());
         let ends_at = |to_ns| TimedMotion {
             from_ns: 0,
             to_ns,

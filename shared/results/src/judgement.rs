@@ -159,10 +159,7 @@ mod tests {
                 now *= pose(1e-3 * speed, 0.0, 1e-3 * 0.3 * (0.53 * t).sin());
             }
         }
-        Trajectory {
-            stamp_ns: Some(stamps),
-            poses,
-        }
+        Trajectory::timed(stamps, poses)
     }
 
     fn ate_m(estimate: &Trajectory, truth: &Trajectory) -> f64 {

@@ -58,13 +58,8 @@ impl Drive {
             }
         };
         let motions = (0..motions).map(motion).collect();
-        Self {
-            truth: Trajectory {
-                stamp_ns: Some(stamps_ns),
-                poses: truth,
-            },
-            motions,
-        }
+        let truth = Trajectory::timed(stamps_ns, truth);
+        Self { truth, motions }
     }
 
     fn matched(&self) -> MatchedMotions {

@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path};
 
-use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, read_trajectory};
+use gyre_datasets::{DatasetOptions, Format, find_ground_truth, read_trajectory};
 use gyre_geometry::{OwnedScan, Pose};
 use gyre_simulator::{
     HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
@@ -40,12 +40,6 @@ fn written(config: &SimulationConfig) -> tempfile::TempDir {
     folder
 }
 
-fn read(dataset: &mut dyn Dataset, index: usize) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    scan.geometry = dataset.read(index, scan.slot()).unwrap();
-    scan
-}
-
 #[test]
 fn each_format_is_detected_and_read_from_disk_and_memory_as_it_was_rendered() {
     for format in FORMATS {
@@ -63,7 +57,7 @@ fn each_format_is_detected_and_read_from_disk_and_memory_as_it_was_rendered() {
         assert_eq!((disk.len(), disk.limits()), (memory.len(), memory.limits()));
         assert_eq!(disk.notes(), memory.notes());
         for index in [2, 0, 1] {
-            let (a, b) = (read(disk.as_mut(), index), read(memory.as_mut(), index));
+            let (a, b) = (disk.scan(index).unwrap(), memory.scan(index).unwrap());
             assert_eq!(a.geometry, b.geometry);
             assert!(
                 a.bytes == b.bytes && a.azimuth_rad == b.azimuth_rad && a.stamp_ns == b.stamp_ns,

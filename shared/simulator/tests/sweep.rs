@@ -99,18 +99,10 @@ fn expected(path: &dyn Path, target: Point2<f64>) -> (usize, f64) {
     (azimuth, seen(azimuth).1)
 }
 
-fn twist([vx_mps, vy_mps, yaw_rate_radps]: [f64; 3]) -> Twist {
-    Twist {
-        vx_mps,
-        vy_mps,
-        yaw_rate_radps,
-    }
-}
-
 /// No point lies near the sweep's seam ahead: a turning vehicle sees those twice or never.
 #[test]
 fn point_appears_where_the_moving_sensor_passed_it() {
-    for motion in [[0.0; 3], [12.0, 0.0, 0.0], [9.0, 0.5, -0.9]].map(twist) {
+    for motion in [[0.0; 3], [12.0, 0.0, 0.0], [9.0, 0.5, -0.9]].map(Twist::from) {
         for (x, y) in [
             (20.0, 10.0),
             (15.0, -25.0),
@@ -138,7 +130,7 @@ fn point_appears_where_the_moving_sensor_passed_it() {
 
 #[test]
 fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
-    let motion = twist([10.0, 0.0, 0.0]);
+    let motion = Twist::from([10.0, 0.0, 0.0]);
     for (x, sign) in [(30.0, -1.0), (-30.0, 1.0)] {
         let at = |shift: f64| brightest(&sweep(point(x, 6.0), &motion, shift)).1;
         let moved_m = (at(0.049) - at(0.0)) * sampling().range_resolution_m;

@@ -207,8 +207,8 @@ configurations! {
     /// A map whose slots of keyframes are used again.
     small_map: SMALL => {
         run: |recording| {
-            let run = Run::small().data(recording).set("run.window=1");
-            run.set("refinement.keyframes=2")
+            let run = Run::small().data(recording);
+            run.sets("run.window=1 refinement.keyframes=2")
         },
         stateful: "refinement",
     }
@@ -282,8 +282,8 @@ configurations! {
     /// The exhaustive search, which is one process in place of two.
     joint_search: SMALL => {
         run: |recording| {
-            let run = Run::small().data(recording).set("raster.n=63");
-            run.set("search.kind=exhaustive")
+            let run = Run::small().data(recording);
+            run.sets("raster.n=63 search.kind=exhaustive")
         },
         rate: "3",
     }

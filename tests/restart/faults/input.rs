@@ -33,9 +33,7 @@ pub fn the_recording_has_gaps(scene: &mut Scene) -> Option<()> {
     let mut running = run.start();
     scene.moment(&mut running)?;
     scene.kill_stage(&running);
-    let ended = running.finish();
-    scene.finished_with(&scene.configuration.results(&alone), &run, &ended);
-    Some(())
+    scene.finished_with(&scene.configuration.results(&alone), &run, running)
 }
 
 /// The images are moved away, and come back soon or only after the end.
@@ -61,8 +59,7 @@ pub fn the_recording_vanishes(scene: &mut Scene) -> Option<()> {
     if away.exists() {
         fs::rename(&away, &images).unwrap();
     }
-    scene.survived(&run, &ended);
-    Some(())
+    scene.survived(&run, &ended)
 }
 
 fn folder_of_images(recording: &Path) -> std::path::PathBuf {

@@ -26,21 +26,19 @@ const LIVES: usize = 8;
 pub fn each_process_is_killed(scene: &mut Scene) -> Option<()> {
     let mut names = scene.processes();
     names.shuffle(&mut scene.rng);
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     for (name, poses) in names.iter().zip(scene.moments(names.len())) {
         running.await_poses_or_end(poses);
         scene.pause(20);
         scene.kill(&mut running, name)?;
     }
-    scene.finished(&run, &running.finish());
+    scene.finished(&run, running)?;
     scene.restarted(&run, &names)
 }
 
 /// A process in the first milliseconds of its life, and perhaps its successor too.
 pub fn a_process_is_killed_as_it_starts(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     let name = scene.processes().choose(&mut scene.rng)?.clone();
     let first = running.await_stage(&name);
     scene.pause(30);
@@ -50,8 +48,7 @@ pub fn a_process_is_killed_as_it_starts(scene: &mut Scene) -> Option<()> {
         scene.pause(30);
         send(second, Signal::KILL);
     }
-    scene.finished(&run, &running.finish());
-    Some(())
+    scene.finished(&run, running)
 }
 
 /// Waits until a file has been written, or a file in a folder been made, so often that it shows.
@@ -74,8 +71,7 @@ fn await_writes(running: &mut Running, path: &Path, writes: u64, limit: Duration
 /// A process at a write of a file that its successor continues from: refinement writes two such
 /// files for each of its keyframes.
 pub fn a_process_is_killed_as_it_writes(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     let (integration, closing) = ("pose-integration", FollowerId::LoopClosure.name());
     let writes = [
         ("refinement", checkpoint::path(run.out())),
@@ -91,8 +87,7 @@ pub fn a_process_is_killed_as_it_writes(scene: &mut Scene) -> Option<()> {
     // No process waits longer between its writes.
     await_writes(&mut running, file, writes, Duration::from_secs(2 * writes))?;
     send(pid, Signal::KILL);
-    scene.finished(&run, &running.finish());
-    Some(())
+    scene.finished(&run, running)
 }
 
 /// The process whose state a restart restores, in many of its lives.
@@ -106,27 +101,24 @@ pub fn a_process_is_killed_again_and_again(scene: &mut Scene) -> Option<()> {
         scene.pause(40);
         scene.kill(&mut running, name)?;
     }
-    scene.finished(&run, &running.finish());
+    scene.finished(&run, running)?;
     scene.restarted(&run, &[name.to_owned()])
 }
 
 /// A process when all poses are there: its death does not take them back.
 pub fn a_process_is_killed_after_the_last_pose(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     let name = scene.processes().choose(&mut scene.rng)?.clone();
     let pid = running.await_stage(&name);
     running.await_poses_or_end(scene.configuration.poses);
     send(pid, Signal::KILL);
-    scene.finished(&run, &running.finish());
-    Some(())
+    scene.finished(&run, running)
 }
 
 /// Most of all processes together, again and again, and now and then the supervisor with them: the
 /// same command continues.
 pub fn processes_are_killed_in_storms(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     for storm in 1..=STORMS {
         running.await_poses_or_end(storm * scene.configuration.poses / STORMS);
         scene.pause(50);
@@ -142,8 +134,7 @@ pub fn processes_are_killed_in_storms(scene: &mut Scene) -> Option<()> {
             running = run.start();
         }
     }
-    scene.finished(&run, &running.finish());
-    Some(())
+    scene.finished(&run, running)
 }
 
 /// The supervisor, up to five times; its stages follow it.
@@ -154,31 +145,26 @@ pub fn the_supervisor_is_killed(scene: &mut Scene) -> Option<()> {
         scene.moment(&mut running)?;
         running.kill_supervisor();
     }
-    scene.resumed(&run);
-    Some(())
+    scene.resumed(&run)
 }
 
 /// The supervisor while it writes the results.
 pub fn the_supervisor_is_killed_as_it_writes_results(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     running.await_poses_or_end(1);
     let writes = scene.rng.random_range(1..=20);
     await_writes(&mut running, run.out(), writes, Duration::from_secs(60))?;
     running.kill_supervisor();
-    scene.resumed(&run);
-    Some(())
+    scene.resumed(&run)
 }
 
 /// SIGINT or SIGTERM in the middle. The same command continues.
 pub fn the_run_is_interrupted(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     running.await_poses_or_end(scene.moments(1)[0]);
     interrupted(scene, running, Some(130))?;
     assert_eq!(run.summary()["ending"], "interrupted");
-    scene.resumed(&run);
-    Some(())
+    scene.resumed(&run)
 }
 
 /// SIGINT or SIGTERM while the processes start. Before there is anything to remove, the signal
@@ -190,8 +176,7 @@ pub fn the_run_is_interrupted_as_it_starts(scene: &mut Scene) -> Option<()> {
         scene.pause(60);
         interrupted(scene, running, None)?;
     }
-    scene.resumed(&run);
-    Some(())
+    scene.resumed(&run)
 }
 
 /// Interrupts a run. It ends with this code, or, where `None` is permitted, by the signal.

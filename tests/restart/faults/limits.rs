@@ -6,7 +6,7 @@ use std::{fs, process::Command};
 use rand::Rng;
 
 use super::{scene::Scene, tools::limit};
-use crate::common::{Pid, Run, assert_nothing_left, wrapped};
+use crate::common::{Pid, Run, assert_nothing_left, processes::status, wrapped};
 
 /// Address space.
 pub fn memory_runs_out(scene: &mut Scene) -> Option<()> {
@@ -14,17 +14,12 @@ pub fn memory_runs_out(scene: &mut Scene) -> Option<()> {
     let run = scene.run().set("run.stall_timeout_s=3");
     let bytes = 10_f64.powf(scene.rng.random_range(7.0..10.0)) as u64;
     let more = scene.rng.random_range(0..1 << 20);
-    let more = |pid: Pid| Some(address_space(pid)? + more);
+    let more = |pid: Pid| {
+        let size = status(pid, "VmSize")?;
+        let kilobytes: u64 = size.strip_suffix(" kB")?.parse().ok()?;
+        Some((kilobytes << 10) + more)
+    };
     limited(scene, &run, run.command(), ("as", bytes), more)
-}
-
-fn address_space(pid: Pid) -> Option<u64> {
-    let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmSize:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
-    Some(kilobytes << 10)
 }
 
 pub fn descriptors_run_out(scene: &mut Scene) -> Option<()> {
@@ -75,10 +70,9 @@ fn limited(
     // A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack
     // cannot grow (SIGSEGV). For the supervisor that is as good as a kill.
     if resource == "as" && ended.code().is_none() {
-        scene.resumed(run);
+        scene.resumed(run)
     } else {
         assert_nothing_left(run.out());
-        scene.survived(run, &ended);
+        scene.survived(run, &ended)
     }
-    Some(())
 }

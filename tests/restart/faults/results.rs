@@ -53,8 +53,7 @@ pub fn the_disk_is_full(scene: &mut Scene) -> Option<()> {
     let ended = running.finish();
     let _ = fs::remove_file(run.out().join(FILLER));
     mount.remount(&format!("size={PLENTY}"));
-    scene.survived(&run, &ended);
-    Some(())
+    scene.survived(&run, &ended)
 }
 
 /// The folder of the results is mounted read-only, or loses its permissions in the middle.
@@ -69,8 +68,7 @@ pub fn the_results_are_read_only(scene: &mut Scene) -> Option<()> {
         let ended = run.finish();
         assert_one_sentence(&ended);
         mount.remount("rw");
-        scene.resumed(&run);
-        return Some(());
+        return scene.resumed(&run);
     }
     let Some(user) = OtherUser::new(run.folder()) else {
         return Some(());
@@ -95,8 +93,7 @@ pub fn the_results_are_read_only(scene: &mut Scene) -> Option<()> {
     let ended = running.finish();
     assert_nothing_left_of(&root);
     permit(run.out(), true);
-    scene.survived(&run, &ended);
-    Some(())
+    scene.survived(&run, &ended)
 }
 
 /// Lets the owner write into a folder and all below, or not.
@@ -110,8 +107,7 @@ fn permit(folder: &Path, write: bool) {
 
 /// The folder of the results is moved away, and comes back soon, after the end, or never.
 pub fn the_results_vanish(scene: &mut Scene) -> Option<()> {
-    let run = scene.run();
-    let mut running = run.start();
+    let (run, mut running) = scene.started();
     running.await_poses_or_end(1);
     scene.moment(&mut running)?;
     let away = run.folder().join("away");
@@ -131,8 +127,7 @@ pub fn the_results_vanish(scene: &mut Scene) -> Option<()> {
     }
     let ended = running.finish();
     restore(&away, &run);
-    scene.survived(&run, &ended);
-    Some(())
+    scene.survived(&run, &ended)
 }
 
 /// Moves the results back to where they were, unless they are there.

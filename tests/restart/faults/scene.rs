@@ -30,6 +30,12 @@ impl<'a> Scene<'a> {
         self.configuration.run()
     }
 
+    pub fn started(&self) -> (Run, Running) {
+        let run = self.run();
+        let running = run.start();
+        (run, running)
+    }
+
     pub fn processes(&self) -> Vec<String> {
         let undisturbed = self.configuration.undisturbed();
         undisturbed.processes.iter().cloned().collect()
@@ -95,15 +101,16 @@ impl<'a> Scene<'a> {
         None
     }
 
-    /// The run must have continued to its end.
-    pub fn finished(&self, run: &Run, ended: &Ended) {
-        self.finished_with(&self.configuration.undisturbed().results, run, ended);
+    /// The run must continue to its end. Returns what a fault returns that has struck, as the
+    /// judgements below.
+    pub fn finished(&self, run: &Run, running: Running) -> Option<()> {
+        self.finished_with(&self.configuration.undisturbed().results, run, running)
     }
 
     /// The same for results that differ from the results of the configuration.
-    pub fn finished_with(&self, expected: &Results, run: &Run, ended: &Ended) {
-        ended.succeeded();
-        self.assert_complete(run, expected);
+    pub fn finished_with(&self, expected: &Results, run: &Run, running: Running) -> Option<()> {
+        running.finish().succeeded();
+        self.assert_complete(run, expected)
     }
 
     /// Processes that were not killed must not have been restarted. `None` if one of the others was
@@ -119,16 +126,17 @@ impl<'a> Scene<'a> {
     }
 
     /// The run may have continued to its end, or have ended with a sentence.
-    pub fn survived(&self, run: &Run, ended: &Ended) {
+    pub fn survived(&self, run: &Run, ended: &Ended) -> Option<()> {
         if ended.status.success() {
-            return self.finished(run, ended);
+            ended.succeeded();
+            return self.assert_complete(run, &self.configuration.undisturbed().results);
         }
         assert_one_sentence(ended);
-        self.resumed(run);
+        self.resumed(run)
     }
 
     /// The same command must make the run complete, and lose none of the poses that are there.
-    pub fn resumed(&self, run: &Run) {
+    pub fn resumed(&self, run: &Run) -> Option<()> {
         let records: Result<Vec<_>, _> = journal::poses(run.out()).unwrap().collect();
         let records = records.unwrap();
         run.finish().succeeded();
@@ -140,12 +148,14 @@ impl<'a> Scene<'a> {
             "{} poses were there, but it resumed after {resumed_after}",
             records.len()
         );
+        Some(())
     }
 
-    fn assert_complete(&self, run: &Run, expected: &Results) {
+    fn assert_complete(&self, run: &Run, expected: &Results) -> Option<()> {
         let difference = expected.difference(&self.configuration.results(run));
         assert_eq!(difference, None, "differs from the undisturbed run");
         assert_eq!(run.summary()["ending"], "complete");
+        Some(())
     }
 }
 

@@ -6,12 +6,7 @@ use std::{
     process::Command,
 };
 
-use crate::common::{Pid, processes::is_alive};
-
-fn works(command: &[&str]) -> bool {
-    let output = Command::new(command[0]).args(&command[1..]).output();
-    output.is_ok_and(|output| output.status.success())
-}
+use crate::common::{Pid, processes::is_alive, works};
 
 /// Limits a resource of a process. That the process is gone already is no error.
 pub fn limit(pid: Pid, resource: &str, value: u64) {

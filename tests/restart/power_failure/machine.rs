@@ -4,7 +4,7 @@ use std::{fs, path::Path, sync::OnceLock, time::Duration};
 
 use gyre::{
     earlier::{self, Begun, Earlier},
-    program,
+    plan,
 };
 use gyre_configuration::{Configuration, terminal::Failure};
 use gyre_contract::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag, run::Ending};
@@ -53,7 +53,7 @@ impl Machine {
         ]
         .map(str::to_owned);
         let configuration = Configuration::of_overrides(&overrides).unwrap();
-        let programs = program::now(&configuration).unwrap();
+        let programs = plan::programs(&configuration).unwrap();
         Self {
             configuration,
             programs,
@@ -226,14 +226,12 @@ impl Stages {
 }
 
 fn item(seq: u64) -> Item {
+    let stamp_ns = 1_700_000_000_000_000_000 + seq as i64 * INTERVAL_NS;
     Item {
-        seq,
-        scan: seq,
         published: seq,
         previous_scan: seq.saturating_sub(1),
-        stamp_ns: 1_700_000_000_000_000_000 + seq as i64 * INTERVAL_NS,
         flags: if seq == 0 { flag::BREAK } else { 0 },
-        ..Item::default()
+        ..Item::recorded(seq, seq, stamp_ns)
     }
 }
 

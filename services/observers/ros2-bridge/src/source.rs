@@ -4,7 +4,6 @@
 mod ask;
 mod configuration_estimate;
 mod driver;
-mod fixes;
 mod radar;
 mod wakeups;
 
@@ -28,8 +27,6 @@ pub struct Settings {
     pub topic: String,
     /// The topics of the sensors beside the radar that are in ROS 2.
     pub sensors: Vec<(SampleKind, String)>,
-    /// The address that receives the fixes.
-    pub fixes_to: String,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -48,7 +45,6 @@ impl Settings {
             domain: Domain::new(source.domain, interface)?,
             topic: source.topic.clone(),
             sensors: Vec::new(),
-            fixes_to: String::new(),
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
@@ -71,7 +67,6 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Run
     let in_ros2 = sensors.iter().filter(|it| it.kind() == SensorKind::Ros2);
     let topics = in_ros2.filter_map(|it| Some((it.of(), it.live_topic()?.to_owned())));
     settings.sensors = topics.collect();
-    settings.fixes_to.clone_from(&gnss.listen);
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::open(settings)?, scans)
 }

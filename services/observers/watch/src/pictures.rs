@@ -154,7 +154,7 @@ pub fn decode(message: &[u8]) -> Option<(serde_json::Value, Vec<u8>)> {
 mod tests {
     use std::f32::consts::TAU;
 
-    use gyre_geometry::SweepGeometry;
+    use gyre_geometry::{OwnedScan, SweepGeometry};
     use ndarray::Array2;
 
     use super::*;
@@ -164,28 +164,18 @@ mod tests {
 
     /// Returns the picture of a clockwise scan with one strong return.
     fn picture(azimuth: usize, bin: usize) -> (serde_json::Value, Vec<u8>) {
-        let mut bytes = vec![10; AZIMUTHS * BINS];
-        bytes[azimuth * BINS + bin] = 255;
-        let azimuth_rad: Vec<_> = (0..AZIMUTHS).map(|a| a as f32 * TAU / 800.0).collect();
-        let stamp_ns: Vec<_> = (0..AZIMUTHS as i64).map(|a| a * 312_500).collect();
-        let sweep = PolarScan {
-            geometry: SweepGeometry {
-                azimuths: AZIMUTHS,
-                bins: BINS,
-                stride: BINS,
-                first_byte: 0,
-                range_resolution_m: 0.2,
-                range_offset_m: 0.0,
-                doppler_s: 0.0,
-                sense: Sense::Clockwise,
-                stamp_ns: 0,
-            },
-            bytes: &bytes,
-            azimuth_rad: &azimuth_rad,
-            stamp_ns: &stamp_ns,
-            flags: &[1; AZIMUTHS],
-        };
-        decode(&scan(&sweep, 7, 9).unwrap()).unwrap()
+        let mut sweep = OwnedScan::of(SweepGeometry {
+            azimuths: AZIMUTHS,
+            bins: BINS,
+            stride: BINS,
+            range_resolution_m: 0.2,
+            ..SweepGeometry::default()
+        });
+        sweep.bytes.fill(10);
+        sweep.bytes[azimuth * BINS + bin] = 255;
+        sweep.azimuth_rad = (0..AZIMUTHS).map(|a| a as f32 * TAU / 800.0).collect();
+        sweep.stamp_ns = (0..AZIMUTHS as i64).map(|a| a * 312_500).collect();
+        decode(&scan(&sweep.view(), 7, 9).unwrap()).unwrap()
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! The trajectory that agrees with the loops: follows `journal/keyframes.log` and
-//! `journal/loops.log`, and the fixes of GNSS, which for a live receiver are written to
-//! `journal/gnss.csv` here. New loops and fixes update the standing estimate; when both logs have
-//! ended, the poses are solved again, so that the last correction equals the results.
+//! `journal/loops.log`, and the fixes of GNSS, which for a live receiver come on `gnss`. New loops
+//! and fixes update the standing estimate; when both logs have ended, the poses are solved again,
+//! so that the last correction equals the results.
+
+mod live_fixes;
 
 use std::{mem, path::Path};
 
@@ -10,16 +12,16 @@ use gyre_contract::{
     run::{SourceConfig, StageCounters},
 };
 use gyre_geometry::{UncertainMotion, covariance, samples::GnssConfig, xy_yaw};
-use gyre_recording::{ReceivedFixes, received_fixes};
 use gyre_slam::{
     EstimatorKind, Fixes, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig,
     TrajectoryEstimator,
 };
 use gyre_stage::{
-    Follower, GnssReceiver, Launch,
+    Follower, Launch,
     follower::{self, Progress, Step},
 };
 use gyre_transport::{RunError, services::LogId};
+use live_fixes::LiveFixes;
 
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
@@ -27,12 +29,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let kind = slam.kind.estimator().ok_or_else(|| {
         RunError::Input("slam.kind is none: there is no trajectory to correct".to_owned())
     })?;
-    let out = &launch.manifest.out;
+    let manifest = &launch.manifest;
     let config: GnssConfig = launch.section("gnss")?;
-    let mut trajectory = Trajectory::open(out, kind, fixes(launch, &config)?)?;
-    // One that is started after the last scan receives no more: that may be of another drive.
-    if config.is_live() && !trajectory.keyframes.has_ended() {
-        trajectory.live_fixes = Some(LiveFixes::open(config, out)?);
+    let mut trajectory = Trajectory::open(&manifest.out, kind, fixes(launch, &config)?)?;
+    let is_over = trajectory.keyframes.has_ended() && !LiveFixes::have_begun(manifest);
+    if config.is_live() && !is_over {
+        trajectory.live_fixes = Some(LiveFixes::open(config, &launch.node, manifest)?);
     }
     follower::run(launch, &mut trajectory)
 }
@@ -130,7 +132,7 @@ impl Trajectory {
         let Some(live) = &mut self.live_fixes else {
             return Ok(());
         };
-        if let Some(fixes) = live.take(self.is_final)? {
+        if let Some(fixes) = live.examine(self.is_final)? {
             self.fixes = fixes.clone();
             if self.estimator.replace_fixes(fixes) {
                 self.corrected = None;
@@ -180,9 +182,7 @@ impl Follower for Trajectory {
     const LOGS: &'static [LogId] = &[LogId::Keyframes, LogId::Loops];
 
     fn step(&mut self) -> Result<Step<CorrectionHeader>, RunError> {
-        if let Some(live) = &mut self.live_fixes {
-            live.receiver.receive()?;
-        }
+        self.live_fixes.iter_mut().try_for_each(LiveFixes::take)?;
         if self.advance()? {
             return Ok(Step::Worked(None));
         }
@@ -207,55 +207,11 @@ impl Follower for Trajectory {
     }
 
     fn sync(&mut self) -> Result<(), RunError> {
-        let received = self.live_fixes.as_mut();
-        received.map_or(Ok(()), |live| live.receiver.finish())
+        self.live_fixes.iter_mut().try_for_each(LiveFixes::finish)
     }
 
     fn progress(&self) -> Progress {
         Progress::of(self.read[1], self.keyframes.len())
-    }
-}
-
-/// The time to examine all fixes grows with their number. So during the run they are examined when
-/// one in so many is new: after ten hours at 20 Hz that is every 18 s.
-const NEW_SHARE: usize = 2000;
-
-struct LiveFixes {
-    receiver: GnssReceiver,
-    config: GnssConfig,
-    received: ReceivedFixes,
-    examined: usize,
-}
-
-impl LiveFixes {
-    fn open(config: GnssConfig, out: &Path) -> Result<Self, RunError> {
-        let log = received_fixes(out);
-        Ok(Self {
-            receiver: GnssReceiver::open(&config, &log)?,
-            received: ReceivedFixes::new(&log),
-            examined: 0,
-            config,
-        })
-    }
-
-    /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
-    /// With `is_last` nothing is received after this.
-    fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, RunError> {
-        if is_last {
-            self.receiver.finish()?;
-        }
-        self.received.read_on().map_err(RunError::input)?;
-        let new = self.received.count() - self.examined;
-        let least = if is_last {
-            1
-        } else {
-            self.examined / NEW_SHARE + 1
-        };
-        Ok((new >= least).then(|| {
-            self.examined += new;
-            let fixes = self.received.log().on_radar(&self.config);
-            Fixes::new(fixes, &self.config)
-        }))
     }
 }
 

@@ -126,7 +126,7 @@ impl Intake {
 #[cfg(test)]
 mod tests {
     use gyre_colossus::{
-        ByteOrder, ClockFormat, Datagrams, Event, Message, Powers, asterix::write_azimuth,
+        ByteOrder, ClockFormat, Datagrams, Event, Message, asterix::write_azimuth,
     };
 
     use super::*;
@@ -140,14 +140,7 @@ mod tests {
 
     /// The datagrams of each turn of a radar, two for each azimuth.
     fn turns(count: u16) -> Vec<Vec<Vec<u8>>> {
-        let radar = Configuration {
-            azimuth_samples: AZIMUTHS,
-            bin_size: 438,
-            range_in_bins: BINS,
-            encoder_size: ENCODER,
-            rotation_mhz: 4000,
-            ..Configuration::default()
-        };
+        let radar = Configuration::usual(AZIMUTHS, BINS);
         let clock = ClockFormat {
             order: ByteOrder::Big,
             ..ClockFormat::default()
@@ -156,14 +149,7 @@ mod tests {
         let mut turns = vec![Vec::new(); usize::from(count)];
         for sent in &mut turns {
             for row in 0..AZIMUTHS {
-                let (seconds, split_seconds) = clock.fields(stamp_ns);
-                let azimuth = Azimuth {
-                    sweep_counter: 0,
-                    encoder: row * 14,
-                    seconds,
-                    split_seconds,
-                    powers: Powers::Eight(&[7; BINS as usize]),
-                };
+                let azimuth = Azimuth::at(row * 14, stamp_ns, clock, &[7; BINS as usize]);
                 let mut send = |datagram: &[u8]| sent.push(datagram.to_vec());
                 write_azimuth(&radar, &azimuth, &mut number, &mut send);
                 stamp_ns += 625_000;

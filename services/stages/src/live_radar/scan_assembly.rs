@@ -130,7 +130,7 @@ impl ScanAssembly {
 
 #[cfg(test)]
 mod tests {
-    use gyre_colossus::{ClockFormat, Powers};
+    use gyre_colossus::ClockFormat;
 
     use super::*;
 
@@ -146,14 +146,7 @@ mod tests {
 
     impl Source {
         fn new() -> Self {
-            let radar = Configuration {
-                azimuth_samples: AZIMUTHS,
-                bin_size: 438,
-                range_in_bins: 16,
-                encoder_size: 5600,
-                rotation_mhz: 4000,
-                ..Configuration::default()
-            };
+            let radar = Configuration::usual(AZIMUTHS, 16);
             let mut turns = TurnCounter::resume(None, 0);
             turns.configure(250_000_000);
             Self {
@@ -166,14 +159,7 @@ mod tests {
 
         /// Adds an azimuth with this time; returns the missing ones of the scan that it completes.
         fn add(&mut self, row: u16, stamp_ns: i64) -> Option<usize> {
-            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
-            let azimuth = Azimuth {
-                sweep_counter: row,
-                encoder: row * 14,
-                seconds,
-                split_seconds,
-                powers: Powers::Eight(&[7; 16]),
-            };
+            let azimuth = Azimuth::at(row * 14, stamp_ns, ClockFormat::default(), &[7; 16]);
             let (header, bytes) = (&mut self.header, &mut self.bytes);
             let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);
             scan.map(|(missing, _)| missing)

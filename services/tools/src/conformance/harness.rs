@@ -47,7 +47,7 @@ impl Candidate {
 /// A program in a run of its own, which this process feeds and receives from.
 pub(crate) struct Harness<'a> {
     // Dropped in this order: process, ports, run.
-    process: Option<Process>,
+    pub process: Option<Process>,
     /// The publishers of the inputs by topic.
     feeds: BTreeMap<&'static str, TopicWriter>,
     pub output: Tap,
@@ -67,11 +67,7 @@ impl<'a> Harness<'a> {
     /// Creates the services of the run, and opens the topics of the stage.
     pub(crate) fn open(mut rig: Rig<'a>, candidate: &'a Candidate) -> Result<Self, RunError> {
         rig.create_services()?;
-        let topics = StageTopics::of(
-            candidate.stage,
-            &rig.manifest().window,
-            rig.manifest().refines,
-        );
+        let topics = candidate.topics();
         let mut harness = Self {
             process: None,
             feeds: BTreeMap::new(),
@@ -98,11 +94,6 @@ impl<'a> Harness<'a> {
         let (command, scheduling) = (&candidate.command, &candidate.scheduling);
         self.process = Some(self.rig.start(name, command, scheduling, stands_by)?);
         Ok(())
-    }
-
-    /// Lets a process that stands by begin.
-    pub(crate) fn end_input(&mut self) {
-        self.process.iter_mut().for_each(Process::end_input);
     }
 
     /// Answers the subscribe handshakes of the process; returns the topics that it has notified.
@@ -147,15 +138,6 @@ impl<'a> Harness<'a> {
     /// Returns the end of the process; `None` while it runs or before it is started.
     pub(crate) fn death(&mut self) -> Option<Death> {
         self.process.as_mut().and_then(Process::death)
-    }
-
-    pub(crate) fn terminate(&self) {
-        self.process.iter().for_each(Process::terminate);
-    }
-
-    /// Kills the process with its group, and waits for its end.
-    pub(crate) fn kill(&mut self) -> Result<(), SuperviseError> {
-        self.process.take().map_or(Ok(()), Process::kill)
     }
 }
 

@@ -37,7 +37,7 @@ impl Reference {
         self.topic(Pose::TOPIC).len().saturating_sub(1) as u64
     }
 
-    pub(crate) fn compute(test: &Test, signals: &Signals) -> Result<Self, Failure> {
+    pub(crate) fn compute(test: &Test<'_>, signals: &Signals) -> Result<Self, Failure> {
         let mut rig = test.rig("own", signals)?;
         rig.create_services()?;
         let mut reference = OwnPipeline::begin(test, &rig)?.run()?;
@@ -61,7 +61,7 @@ impl Reference {
 
 #[derive(Clone, Copy)]
 pub(crate) struct Context<'a> {
-    pub test: &'a Test,
+    pub test: &'a Test<'a>,
     pub reference: &'a Reference,
     pub signals: &'a Signals,
 }
@@ -78,7 +78,7 @@ struct OwnPipeline<'a> {
 }
 
 impl<'a> OwnPipeline<'a> {
-    fn begin(test: &Test, rig: &'a Rig<'a>) -> Result<Self, Failure> {
+    fn begin(test: &Test<'_>, rig: &'a Rig<'a>) -> Result<Self, Failure> {
         let manifest = rig.manifest();
         let mut stages = test.stages.clone();
         stages.retain(|it| *it != StageId::PoseIntegration);
@@ -101,7 +101,7 @@ impl<'a> OwnPipeline<'a> {
             poses,
             taps,
             rig,
-            stall_timeout: test.demands.start_timeout,
+            stall_timeout: test.arguments.start_timeout_s,
             reference: Reference::default(),
         })
     }

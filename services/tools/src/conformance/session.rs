@@ -1,7 +1,5 @@
 //! One process under test in a run of its own: its inputs and its outputs.
 
-mod feeding;
-
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt,
@@ -9,18 +7,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::RunError;
+use gyre_client::{RunError, clock};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Item, Message, Pose, StageId, flag};
-use gyre_supervise::{Death, SuperviseError, rig::Recorded};
+use gyre_supervise::{
+    Death, SuperviseError,
+    rig::{Process, Recorded},
+};
 
 use crate::conformance::{
-    Demands, Test,
+    ConformanceArguments, Test,
     harness::{Harness, Sent, start_of_trajectory},
-    item::{not_copied, wrong_stamps},
     reference::{Context, POLL_PERIOD, Reference},
-    result::result_bytes,
-    rule::{Findings, Rule},
+    report::{Findings, Rule},
+    result::{not_copied, result_bytes, wrong_stamps},
 };
 
 /// The time of watching a program that must send nothing.
@@ -39,7 +39,7 @@ pub(crate) enum Pace {
 
 pub(crate) struct Session<'a> {
     pub harness: Harness<'a>,
-    pub test: &'a Test,
+    pub test: &'a Test<'a>,
     pub reference: &'a Reference,
     pub findings: &'a mut Findings,
     pub pace: Pace,
@@ -113,8 +113,8 @@ impl<'a> Session<'a> {
         self.test.candidate.stage
     }
 
-    pub(crate) fn demands(&self) -> &'a Demands {
-        &self.test.demands
+    pub(crate) fn arguments(&self) -> &'a ConformanceArguments {
+        self.test.arguments
     }
 
     pub(crate) fn output_topic(&self) -> &'static str {
@@ -129,7 +129,7 @@ impl<'a> Session<'a> {
 
     /// Waits until the process has answered an item; the limit is that for one item.
     pub(crate) fn reach(&mut self, seq: u64) -> Result<Waited, Failure> {
-        let limit = self.demands().item_timeout;
+        let limit = self.arguments().patience_s;
         self.wait(limit, |session| session.newest >= Some(seq))
     }
 
@@ -240,7 +240,8 @@ impl<'a> Session<'a> {
     }
 
     pub(crate) fn kill(&mut self) -> Result<(), Failure> {
-        self.harness.kill()?;
+        let process = self.harness.process.take();
+        process.map_or(Ok(()), Process::kill)?;
         self.receive()?;
         Ok(self.harness.rig.remove_dead()?)
     }
@@ -308,6 +309,84 @@ impl<'a> Session<'a> {
                 let sentence = format!("item {} has other bytes {when}", item.seq);
                 self.findings.broken(rule, sentence);
             }
+        }
+        Ok(())
+    }
+}
+
+/// The messages that are fed to the process: its inputs as they are admitted, and the feedback of
+/// the rest of the run to its answers.
+impl Session<'_> {
+    /// Sends the feedback of the rest of the run to an item.
+    fn answered(&mut self, seq: u64) -> Result<(), RunError> {
+        if self.newest.is_some_and(|newest| seq <= newest) || self.pace == Pace::Hold {
+            return Ok(());
+        }
+        let first = self.newest.map_or(0, |newest| newest + 1);
+        self.newest = Some(seq);
+        for seq in first..=seq.min(self.reference.end()) {
+            self.feed(&self.harness.topics.feedback, seq)?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn admit(&mut self) -> Result<(), RunError> {
+        let last = self.reference.end().min(self.until.saturating_sub(1));
+        while self.next <= last && self.is_admitted(self.next) {
+            self.send_inputs(self.next)?;
+        }
+        Ok(())
+    }
+
+    fn is_admitted(&self, seq: u64) -> bool {
+        match self.pace {
+            Pace::Window => self.harness.rig.manifest().window.admits(seq, self.newest),
+            Pace::Single => seq <= self.newest.map_or(0, |newest| newest + 1),
+            Pace::Hold => false,
+        }
+    }
+
+    pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), RunError> {
+        if self.harness.topics.copied().is_some() {
+            self.sent_ns.entry(seq).or_insert_with(clock::now_ns);
+        }
+        self.feed(&self.harness.topics.forward, seq)?;
+        self.next = seq + 1;
+        Ok(())
+    }
+
+    pub(crate) fn feed(&self, topics: &[&'static str], seq: u64) -> Result<(), RunError> {
+        for topic in topics {
+            if let Some(message) = self.reference.get(topic, seq) {
+                self.harness.feed(topic, message)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Publishes the inputs again as after a restart of all stages: the last poses, and of the
+    /// items so far only those that a restarted stage may need. Those after them follow as they are
+    /// admitted.
+    pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), RunError> {
+        self.harness.open_feeds()?;
+        self.republish_poses(newest_pose)?;
+        let look_back = self.harness.rig.manifest().window.look_back as u64;
+        self.newest = Some(newest_pose);
+        self.next = (newest_pose + 1).saturating_sub(look_back);
+        Ok(())
+    }
+
+    fn republish_poses(&mut self, newest: u64) -> Result<(), RunError> {
+        let history = Pose::sizes(&self.harness.rig.manifest().window).history as u64;
+        for seq in (newest + 1).saturating_sub(history)..=newest {
+            let Some(pose) = self.reference.get(Pose::TOPIC, seq) else {
+                continue;
+            };
+            let mut item = pose.item();
+            if seq < newest {
+                item.flags &= !flag::SYNC;
+            }
+            self.harness.feed(Pose::TOPIC, &pose.about(&item))?;
         }
         Ok(())
     }

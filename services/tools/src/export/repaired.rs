@@ -12,12 +12,11 @@ use gyre_configuration::terminal::{Failure, print};
 use gyre_datasets::{DatasetOptions, Format, LostAzimuthOption, find_ground_truth, stored_options};
 use gyre_geometry::{LostAzimuths, OwnedScan};
 use gyre_radar::lost::{repair, stale_rows};
+use gyre_slam::mapping::encode_png;
 use gyre_storage::{StorageError, create_folder, write as write_file};
+use png::ColorType;
 
-use crate::{
-    export::source::{Lost, Scans, Source},
-    masks::picture::write_grey,
-};
+use crate::export::source::{Lost, Scans, Source};
 
 /// The folder of the images in RADIATE's form; the list of their times lies beside it.
 const IMAGES: &str = "Navtech_Polar";
@@ -175,6 +174,11 @@ fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
         copy(&list, &to)?;
     }
     copy(&times, &out.join(IMAGES).with_extension("txt"))
+}
+
+pub fn write_grey(path: &Path, width: usize, pixels: &[u8]) -> Result<(), Failure> {
+    let picture = encode_png(width, ColorType::Grayscale, pixels)?;
+    Ok(fs::write(path, picture).map_err(StorageError::at("write", path))?)
 }
 
 fn copy(from: &Path, to: &Path) -> Result<(), Failure> {

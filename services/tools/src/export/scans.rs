@@ -13,10 +13,10 @@ use gyre_ros2_messages::{
 
 use crate::{
     export::{
-        arguments::ScanForm,
+        ScanForm,
         source::{Lost, Scans, Source},
     },
-    radar_server::configuration,
+    radar_server,
 };
 
 const CONFIGURATION: &str = "/radar_data/configuration_data";
@@ -104,7 +104,7 @@ impl Losses {
         Ok(Radar {
             bin_size: 0,
             packet_rate: 0,
-            ..configuration(scans.dataset.as_ref(), geometry, encoder.counts)?
+            ..radar_server::radar(scans.dataset.as_ref(), geometry, encoder.counts)?
         })
     }
 
@@ -263,24 +263,19 @@ impl Scans {
 
 #[cfg(test)]
 mod tests {
-    use gyre_geometry::ScanLimits;
-
     use super::*;
 
     /// A scan of ten azimuths, 1 ms apart, all measured.
     fn scan() -> OwnedScan {
-        let mut scan = OwnedScan::with_limits(ScanLimits {
-            bytes: 20,
+        let mut scan = OwnedScan::of(SweepGeometry {
             azimuths: 10,
+            bins: 2,
+            stride: 2,
+            stamp_ns: 4_500_000,
+            ..SweepGeometry::default()
         });
-        (scan.geometry.azimuths, scan.geometry.bins) = (10, 2);
-        scan.geometry.stride = 2;
         scan.bytes.fill(7);
-        scan.flags.fill(flag::MEASURED);
-        for (stamp_ns, ms) in scan.stamp_ns.iter_mut().zip(0..) {
-            *stamp_ns = ms * 1_000_000;
-        }
-        scan.geometry.stamp_ns = 4_500_000;
+        scan.stamp_ns = (0..10).map(|ms| ms * 1_000_000).collect();
         scan
     }
 

@@ -1,18 +1,14 @@
 //! `gyre localise`: finds a drive in a map.
 
-mod counts;
 mod scans;
-pub mod searched_map;
 
 use std::{
     fmt::Write,
     path::{Path, PathBuf},
-    process::ExitCode,
     time::Instant,
 };
 
 use clap::Args;
-use counts::{Counts, Located};
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, inputs::Inputs, print},
@@ -28,7 +24,7 @@ use gyre_slam::{
 use gyre_storage::{self as storage, Draft};
 use serde::Serialize;
 
-use crate::bar::Bar;
+use crate::{bar::Bar, maps::folder};
 
 pub use scans::{RegisteredScan, Scans};
 
@@ -58,21 +54,11 @@ pub struct LocaliseArguments {
     pub json: bool,
 }
 
-/// The figures of a drive, as `--json` prints them.
-#[derive(Serialize)]
-struct Figures<'a> {
-    #[serde(flatten)]
-    counts: &'a Counts,
-    left_out: usize,
-    ms_a_scan: f64,
-    fixes: PathBuf,
-}
-
 /// Localises the scans of a recording in a map, and writes `fixes.csv`.
 /// If no scan was found, the error is returned after all files are written.
-pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
+pub fn localise(arguments: &LocaliseArguments) -> Result<(), Failure> {
     let configuration = arguments.inputs.configuration()?;
-    let mut localiser = searched_map::open(&arguments.map, &configuration)?;
+    let mut localiser = localiser(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;
     let _locked = Out::lock_for(out, Content::FIXES)?;
@@ -91,27 +77,48 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let drawn = draw(&arguments.map, &found, out);
     ended?;
     drawn?;
-    let counts = Counts::of(&found.scans);
     let figures = Figures {
-        counts: &counts,
         left_out: scans.left_out,
         ms_a_scan,
         fixes: out.join(FIXES),
+        ..Figures::of(&found.scans)
     };
-    if arguments.json {
-        print::line(serde_json::to_string_pretty(&figures)?)?;
-    } else {
-        print::line(counts.summary(figures.left_out))?;
-        let fixes = figures.fixes.display();
-        print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
+    match arguments.json {
+        true => print::line(serde_json::to_string_pretty(&figures)?)?,
+        false => print::line(figures.summary())?,
     }
     match found.has_fix() {
-        true => Ok(ExitCode::SUCCESS),
+        true => Ok(()),
         false => {
             let (data, map) = (configuration.data(), arguments.map.display());
             Err(format!("no scan of {data} was found in {map}: it may be of another place, or made with settings for another radar. If the first {FIRST} scans are not found, {PROBES} others over the drive are searched; source.first and source.scans choose a part").into())
         }
     }
+}
+
+/// Opens the map in a folder, and plans localisation in it.
+pub fn localiser(path: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
+    folder::settle(path)?;
+    let drawn = Map::open(path)?;
+    let map = KeptMap::open(path)
+        .map_err(|error| format!("{} cannot be localised in: {error}", path.display()))?;
+    let (path, drawn, kept) = (path.display(), drawn.keyframes(), map.keyframes().len());
+    if kept != drawn {
+        return Err(format!("{path} was drawn from {drawn} keyframes and keeps {kept}: draw the map again with gyre map").into());
+    }
+    plan(map, configuration)
+}
+
+pub fn plan(map: KeptMap, configuration: &Configuration) -> Result<Localiser, Failure> {
+    let odometry = &configuration.odometry;
+    let capacity = odometry.points.capacity;
+    if capacity == 0 {
+        return Err(
+            "points.capacity is 0, but scans are localised by their points: it must be 1 or more"
+                .into(),
+        );
+    }
+    Ok(Localiser::new(map, &odometry.refinement, capacity)?)
 }
 
 #[derive(Default)]
@@ -214,10 +221,7 @@ fn status_name(status: Status) -> &'static str {
 
 fn draw(map: &Path, path: &Found, out: &Path) -> Result<(), Failure> {
     let mut text = Vec::new();
-    let trajectory = Trajectory {
-        stamp_ns: Some(path.stamps_ns.clone()),
-        poses: path.pieces.concat(),
-    };
+    let trajectory = Trajectory::timed(path.stamps_ns.clone(), path.pieces.concat());
     write_tum(&trajectory, &mut text)
         .map_err(|error| format!("cannot write the fixes: {error}"))?;
     storage::write(&out.join(TUM), text)?;
@@ -228,4 +232,108 @@ fn draw(map: &Path, path: &Found, out: &Path) -> Result<(), Failure> {
     };
     let picture = map_png(&mut Map::open(map)?, &overlay)?;
     Ok(storage::write(&out.join(PICTURE), picture)?)
+}
+
+/// Spans without a fix that are listed.
+const LISTED: usize = 10;
+
+/// A scan: its number, its time in ns, and whether it was found.
+type Located = (usize, i64, Status);
+
+/// The figures of a drive, as `--json` prints them.
+#[derive(Debug, Default, Serialize)]
+struct Figures {
+    found: usize,
+    tracked: usize,
+    predicted: usize,
+    lost: usize,
+    /// The first scan with a fix, and its time after the first scan, s.
+    first_fix: Option<(usize, f64)>,
+    /// The first and the last scan of each span where the localiser was lost.
+    lost_scans: Vec<(usize, usize)>,
+    left_out: usize,
+    ms_a_scan: f64,
+    fixes: PathBuf,
+}
+
+impl Figures {
+    fn of(scans: &[Located]) -> Self {
+        let count = |status: Status| scans.iter().filter(|it| it.2 == status).count();
+        let after_s = |stamp_ns: i64| stamp_ns.saturating_sub(scans[0].1) as f64 * 1e-9;
+        let first = scans.iter().find(|it| it.2 == Status::Found);
+        let is_lost = |it: &Located| it.2 == Status::Lost;
+        let spans = scans.chunk_by(|one, next| is_lost(one) == is_lost(next));
+        let lost = spans.filter(|span| is_lost(&span[0]));
+        Self {
+            found: count(Status::Found),
+            tracked: count(Status::Tracked),
+            predicted: count(Status::Predicted),
+            lost: count(Status::Lost),
+            first_fix: first.map(|(number, stamp_ns, _)| (*number, after_s(*stamp_ns))),
+            lost_scans: lost.map(|it| (it[0].0, it[it.len() - 1].0)).collect(),
+            ..Self::default()
+        }
+    }
+
+    fn summary(&self) -> String {
+        let mut text = match self.first_fix {
+            Some((scan, after_s)) => format!("first fix: scan {scan}, after {after_s:.1} s"),
+            None => "no scan was found in the map".to_owned(),
+        };
+        let Self {
+            found,
+            tracked,
+            predicted,
+            lost,
+            left_out,
+            ms_a_scan,
+            ..
+        } = self;
+        let (scans, fixes) = (found + tracked + predicted + lost, found + tracked);
+        let percent = 100.0 * fixes as f64 / scans.max(1) as f64;
+        text += &format!("\n{fixes} of {scans} scans localised ({percent:.1} %): ");
+        text += &format!("{found} found, {tracked} tracked; {predicted} predicted, {lost} lost");
+        if *left_out > 0 {
+            text += &format!("; {left_out} more could not be used");
+        }
+        if !self.lost_scans.is_empty() {
+            let span = |(first, last): &(usize, usize)| format!("{first} to {last}");
+            let spans: Vec<String> = self.lost_scans.iter().take(LISTED).map(span).collect();
+            text += &format!("\nlost: scans {}", spans.join(", "));
+            let more = self.lost_scans.len().saturating_sub(LISTED);
+            if more > 0 {
+                text += &format!(" and {more} more times");
+            }
+        }
+        let fixes = self.fixes.display();
+        text + &format!("\n{ms_a_scan:.1} ms a scan; {fixes}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(statuses: &[Status]) -> Figures {
+        let scans = (0..).zip(statuses);
+        let located = scans.map(|(k, status)| (k, k as i64 * 250_000_000, *status));
+        Figures {
+            left_out: 1,
+            ms_a_scan: 2.5,
+            fixes: FIXES.into(),
+            ..Figures::of(&located.collect::<Vec<_>>())
+        }
+    }
+
+    #[test]
+    fn the_summary_says_when_the_first_fix_was_and_where_the_drive_was_lost() {
+        use Status::{Found, Lost, Predicted, Tracked};
+        let drive = [Lost, Lost, Found, Tracked, Predicted, Lost, Found, Tracked];
+        let expected = "first fix: scan 2, after 0.5 s\n\
+            4 of 8 scans localised (50.0 %): 2 found, 2 tracked; 1 predicted, 3 lost; 1 more could not be used\n\
+            lost: scans 0 to 1, 5 to 5\n2.5 ms a scan; fixes.csv";
+        assert_eq!(figures(&drive).summary(), expected);
+        let none = "no scan was found in the map\n0 of 3 scans localised (0.0 %)";
+        assert!(figures(&[Lost; 3]).summary().starts_with(none));
+    }
 }

@@ -1,13 +1,11 @@
 //! `gyre map`: draws the map of a run.
 
 mod arguments;
-mod extend;
 pub mod placing;
 
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    process::ExitCode,
 };
 
 use gyre_configuration::{
@@ -38,17 +36,16 @@ const ODOMETRY: &str = "trajectory.tum";
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
 /// asked for.
-pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
+pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
     let mut drawing = match &arguments.extend {
-        Some(map) => extend::extend(arguments, map)?,
+        Some(map) => placing::extend(arguments, map)?,
         None => draw_run(arguments)?,
     };
     let (keyframes, tiles) = (drawing.keyframes(), drawing.evidence().tiles().len());
     let out = arguments.out.display();
     print::line(format_args!(
         "{keyframes} keyframes in {tiles} tiles, in {out}"
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    ))
 }
 
 fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
@@ -218,25 +215,20 @@ mod tests {
 
     use clap::ValueEnum;
     use gyre_datasets::ground_truth::write_tum_pose;
-    use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
+    use gyre_geometry::{SparsePoint, UncertainMotion, pose};
     use gyre_slam::{RecordLog, localisation, mapping::Map};
 
     use super::*;
 
     fn keyframe(seq: u64) -> Keyframe {
+        let pose = UncertainMotion {
+            motion: pose(2.0 * seq as f64, 0.0, 0.0),
+            ..UncertainMotion::identity()
+        };
+        let points = vec![SparsePoint::from([20.0, 5.0, 0.0, 1.0, 0.0])];
         Keyframe {
-            seq,
-            scan: seq,
             stamp_ns: 1_000_000_000 * (seq as i64 + 1),
-            pose: UncertainMotion {
-                motion: pose(2.0 * seq as f64, 0.0, 0.0),
-                ..UncertainMotion::identity()
-            },
-            motion: UncertainMotion::identity(),
-            noise: nalgebra::Matrix3::zeros(),
-            twist: Twist::default(),
-            path_m: 0.0,
-            points: vec![SparsePoint::from([20.0, 5.0, 0.0, 1.0, 0.0])],
+            ..Keyframe::standing(seq, pose, points)
         }
     }
 

@@ -9,7 +9,7 @@ use gyre_slam::mapping::encode_png;
 use ndarray::Array2;
 use png::ColorType;
 
-use crate::masks::inspection::{Inspection, MaskedRaster};
+use crate::masks::inspector::{Inspection, MaskedRaster};
 
 type Colour = [u8; 3];
 

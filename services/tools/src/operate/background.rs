@@ -7,7 +7,7 @@ use std::{
     io::{Read, Seek, SeekFrom},
     os::unix::fs::{MetadataExt, OpenOptionsExt},
     path::Path,
-    process::{Child, Command, ExitCode, ExitStatus, Stdio},
+    process::{Child, Command, ExitStatus, Stdio},
     time::{Duration, Instant, SystemTime},
 };
 
@@ -17,7 +17,7 @@ use gyre_contract::control::{Phase, Status};
 use gyre_results::SUMMARY;
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::operate::choice::{RunChoice, chosen_to_change};
+use crate::operate::{RunChoice, chosen_to_change};
 
 /// The environment variable of a run that is to leave the terminal that started it.
 const DETACHED: &str = "GYRE_DETACHED";
@@ -37,7 +37,7 @@ pub fn detach_if_asked() {
 
 /// Starts a run in the background, and returns when all its stages are there, or when it has ended
 /// before.
-pub fn up(out: &Path) -> Result<ExitCode, Failure> {
+pub fn up(out: &Path) -> Result<(), Failure> {
     let log = out.join(LOG);
     let unwritable = |error: std::io::Error| format!("cannot write to {}: {error}", log.display());
     fs::create_dir_all(out.join("log")).map_err(unwritable)?;
@@ -58,10 +58,9 @@ pub fn up(out: &Path) -> Result<ExitCode, Failure> {
         if let Some(status) = status_of(out, run.id()) {
             let (name, pid, count) = (out.display(), status.pid, status.processes.len());
             let does = status.notice.unwrap_or(format!("runs: {count} processes"));
-            print::line(format_args!(
+            return print::line(format_args!(
                 "{name} {does}, supervised by {pid}; gyre ps, top, logs -f, down"
-            ))?;
-            return Ok(ExitCode::SUCCESS);
+            ));
         }
         if signals.sleep(PERIOD)? {
             // It may have ended.
@@ -93,14 +92,13 @@ pub fn status_of(out: &Path, pid: u32) -> Option<Status> {
     (status.pid == pid && is_up).then_some(status)
 }
 
-fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<ExitCode, Failure> {
+fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<(), Failure> {
     let mut bytes = Vec::new();
     output.seek(SeekFrom::Start(begin))?;
     output.read_to_end(&mut bytes)?;
     let text = String::from_utf8_lossy(&bytes);
     if status.success() {
-        print::line(text.trim_end())?;
-        return Ok(ExitCode::SUCCESS);
+        return print::line(text.trim_end());
     }
     let reason = last_line(&text).unwrap_or("it has printed nothing");
     let reason = reason.strip_prefix("gyre: ").unwrap_or(reason);
@@ -108,7 +106,7 @@ fn end(status: ExitStatus, output: &mut File, begin: u64, out: &Path) -> Result<
 }
 
 /// Ends a run as an interrupt does, and waits until its results are written.
-pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
+pub fn down(choice: &RunChoice) -> Result<(), Failure> {
     let run = chosen_to_change(choice)?;
     let status = run.status()?;
     let signals = Signals::install()?;
@@ -133,8 +131,7 @@ pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
     }
     print::line(format_args!(
         "{out} has ended after some {poses} poses; the same command continues from there"
-    ))?;
-    Ok(ExitCode::SUCCESS)
+    ))
 }
 
 /// Returns a mark that distinguishes versions of the results: the summary is written last, and as a

@@ -3,7 +3,6 @@
 use std::{
     io::{self, BufWriter, ErrorKind, Write},
     path::{Path, PathBuf},
-    process::ExitCode,
     time::Duration,
 };
 
@@ -12,7 +11,7 @@ use gyre_client::{AnyMessage, Next, Received, Run};
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Message, Pose, Topic};
 
-use crate::operate::{choice::RunChoice, hz};
+use crate::operate::{RunChoice, hz};
 
 #[derive(Debug, Args)]
 pub struct EchoArguments {
@@ -30,7 +29,7 @@ pub struct EchoArguments {
 }
 
 /// Prints a line for each message of a topic, and how many were missed, until the run ends.
-pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
+pub fn echo(arguments: &EchoArguments) -> Result<(), Failure> {
     let words = &arguments.words;
     let topic = |word: &PathBuf| {
         let name = word.to_str().filter(|_| !word.is_dir())?;
@@ -55,9 +54,9 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
         false => observe(&run, topic, arguments.json),
     };
     match printed.map_err(|error| error.downcast::<io::Error>()) {
-        Ok(()) => Ok(ExitCode::SUCCESS),
+        Ok(()) => Ok(()),
         // Nobody reads it any more, as after `gyre echo OUT | head`.
-        Err(Ok(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(ExitCode::SUCCESS),
+        Err(Ok(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(Ok(error)) => Err(format!("cannot print: {error}").into()),
         Err(Err(error)) => Err(error),
     }

@@ -1,6 +1,6 @@
 //! `gyre logs`: the events of a run's processes and their printed lines, as lines for a person.
 
-use std::{path::Path, process::ExitCode, time::Duration};
+use std::{path::Path, time::Duration};
 
 use clap::Args;
 use gyre_client::{Signals, control::Control};
@@ -11,7 +11,7 @@ use gyre_configuration::{
 use gyre_recording::LogTail;
 use serde_json::Value;
 
-use crate::operate::choice::RunChoice;
+use crate::operate::RunChoice;
 
 #[derive(Debug, Args)]
 pub struct LogsArguments {
@@ -32,7 +32,7 @@ const PERIOD: Duration = Duration::from_millis(200);
 
 /// Prints the newest lines of a run's logs, even after its end, and continues with new lines if
 /// asked to.
-pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
+pub fn logs(arguments: &LogsArguments) -> Result<(), Failure> {
     let process = arguments.process.as_deref();
     let run = arguments.run.run.as_deref();
     let (process, out) = match process.filter(|it| Path::new(it).is_dir()) {
@@ -64,7 +64,7 @@ pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
             break;
         }
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// Returns the logs to print: the events, and what processes print themselves, which is little.

@@ -1,13 +1,11 @@
 //! `gyre ps`: the running runs and their processes.
 
-use std::process::ExitCode;
-
 use clap::Args;
 use gyre_client::{RunError, UsedRun, control::Control};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::control::{Activity, Phase, ProcessStatus, Received, Status};
 
-use crate::operate::choice::RunChoice;
+use crate::operate::RunChoice;
 
 #[derive(Debug, Args)]
 pub struct PsArguments {
@@ -25,7 +23,7 @@ pub struct PsArguments {
 
 const NO_RUN: &str = "no run is running";
 
-pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
+pub fn ps(arguments: &PsArguments) -> Result<(), Failure> {
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
     let runs = match &arguments.run.run {
         Some(out) => vec![Control::of(out)?],
@@ -50,7 +48,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
         _ => rows.iter().map(listed).try_for_each(print::line)?,
     }
     match faults.is_empty() {
-        true => Ok(ExitCode::SUCCESS),
+        true => Ok(()),
         false => Err(faults.join("; ").into()),
     }
 }

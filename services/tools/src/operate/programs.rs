@@ -10,7 +10,7 @@ use gyre_contract::{
     run::StageConfig,
 };
 
-use crate::operate::choice::{RunChoice, chosen_to_change};
+use crate::operate::{RunChoice, chosen_to_change};
 
 #[derive(Debug, Args)]
 pub struct RestartArguments {
@@ -41,11 +41,10 @@ pub struct SwapArguments {
     pub cold: bool,
 }
 
-pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
+pub fn restart(arguments: &RestartArguments) -> Result<(), Failure> {
     let run = chosen_to_change(&arguments.run)?;
     run.restart(&arguments.process)?;
-    print::line(format_args!("{} is started again", arguments.process))?;
-    Ok(ExitCode::SUCCESS)
+    print::line(format_args!("{} is started again", arguments.process))
 }
 
 const EXPLAIN_AFTER_S: f64 = 5.0;

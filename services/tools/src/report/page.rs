@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use base64::{Engine, engine::general_purpose::STANDARD};
 use gyre_configuration::{difference::keys, terminal::Failure};
 use gyre_contract::StageId;
 use gyre_geometry::Pose;
@@ -11,10 +12,7 @@ use gyre_results::{
 };
 use toml::Table;
 
-use crate::report::{
-    html::{escaped, png, section, svg},
-    subject::{Run, Subject},
-};
+use crate::report::{Run, Subject};
 
 /// The groups of figures that stand behind the pictures.
 const LAST: [&str; 2] = ["Counts", "Versions"];
@@ -227,6 +225,35 @@ fn differences(runs: &[(&Subject, &Run)]) -> String {
     format!(
         "<p>The keys in which the runs differ.</p>\n<div class=\"wide\"><table>\n{head}<tbody>\n{rows}</tbody></table></div>"
     )
+}
+
+fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Returns a section with a title; nothing without a content.
+fn section(title: &str, content: &str) -> String {
+    match content.is_empty() {
+        true => String::new(),
+        false => {
+            let title = escaped(title);
+            format!("<section><h2>{title}</h2>\n{content}\n</section>\n")
+        }
+    }
+}
+
+fn png(bytes: &[u8], what: &str) -> String {
+    let what = escaped(what);
+    let data = STANDARD.encode(bytes);
+    format!("<figure><img alt=\"{what}\" src=\"data:image/png;base64,{data}\"></figure>")
+}
+
+/// Returns a picture that is a document of SVG, which a reader of screens names.
+fn svg(text: &str, what: &str) -> String {
+    let what = escaped(what);
+    let text = text.find("<svg").map_or("", |start| &text[start..]);
+    format!("<figure role=\"img\" aria-label=\"{what}\">{text}</figure>")
 }
 
 #[cfg(test)]

@@ -3,14 +3,14 @@
 use std::{sync::Arc, thread, time::Duration};
 
 use gyre_client::run::{free_shared_memory, sweep};
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::{
     StageId,
     run::{Limits, RADAR_HZ, Scenario},
 };
 
 use crate::stress::{
-    Report, TestedPipeline,
+    Provenance, Report, StressArguments, TestedPipeline,
     fault::{self, FaultKind},
     helper::Work,
     pipeline::{Measured, Setup, measure},
@@ -36,66 +36,83 @@ const MOST_RADARS: u32 = 64;
 /// The rate of the source has a limit: 1000 times the sensor's own.
 const MOST_HZ: f64 = 1000.0;
 
-#[derive(Clone, Debug)]
-pub struct Options {
-    pub scenarios: Vec<Scenario>,
-    pub duration: Duration,
-    /// The stages that are stopped, killed or slowed; empty: all, and masking is slowed.
-    pub stages: Vec<StageId>,
-    /// For the choice of stages.
-    pub seed: u64,
-}
-
-/// Carries out all scenarios. `note` receives lines about the progress, `judged` each verdict.
+/// Carries out the scenarios, prints the verdict on each, and writes the report.
 ///
 /// A scenario that could not be carried out has that as its verdict, and the next ones follow.
 pub fn stress(
     tested: &TestedPipeline,
-    options: &Options,
-    note: &mut dyn FnMut(&str),
-    judged: &mut dyn FnMut(&str),
-) -> Report {
-    let mut outcomes = Vec::new();
-    for scenario in &options.scenarios {
-        note(&format!("{scenario}: {}", scenario.line()));
+    arguments: &StressArguments,
+    provenance: Provenance,
+) -> Result<Report, Failure> {
+    let mut stages = arguments.stages.iter();
+    if let Some(stage) = stages.find(|stage| !tested.stages.contains(stage)) {
+        return Err(format!("this run has no stage {}", stage.name()).into());
+    }
+    let scenarios = match arguments.scenarios.is_empty() {
+        true => possible(tested),
+        false => arguments.scenarios.clone(),
+    };
+    let (mut outcomes, mut printed) = (Vec::new(), Ok(()));
+    for scenario in scenarios {
+        print::note(format_args!("{scenario}: {}", scenario.line()));
         let campaign = Campaign {
             tested,
-            options,
-            scenario: *scenario,
-            limits: tested.budget.of(*scenario),
+            arguments,
+            scenario,
+            limits: tested.budget.of(scenario),
         };
-        let outcome = campaign.outcome(note);
-        let outcome = outcome.unwrap_or_else(|error| ScenarioOutcome {
+        let outcome = campaign.outcome().unwrap_or_else(|error| ScenarioOutcome {
             verdict: Verdict::NotCarriedOut,
             problem: Some(error.to_string()),
             ..campaign.empty()
         });
-        judged(&outcome.sentence());
+        printed = print::line(outcome.sentence());
         outcomes.push(outcome);
     }
     // Helpers that were killed have left files in shared memory.
     sweep();
-    Report::of(outcomes)
+    let report = Report::of(outcomes, provenance);
+    report.write(&tested.out)?;
+    printed?;
+    print::line(format_args!(
+        "report in {}: report.json",
+        tested.out.display()
+    ))?;
+    Ok(report)
+}
+
+/// Returns all scenarios except faults of gyro and wheels that are absent from the run or its
+/// recording.
+fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
+    let mut all = Vec::from(Scenario::ALL);
+    all.retain(|scenario| match witness_fault::lacks(tested, *scenario) {
+        None => true,
+        Some(lacking) => {
+            print::note(format_args!("{scenario}: left out: {lacking}"));
+            false
+        }
+    });
+    all
 }
 
 struct Campaign<'a> {
     tested: &'a TestedPipeline,
-    options: &'a Options,
+    arguments: &'a StressArguments,
     scenario: Scenario,
     limits: Limits,
 }
 
 impl Campaign<'_> {
-    fn outcome(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, Failure> {
+    fn outcome(&self) -> Result<ScenarioOutcome, Failure> {
         match self.scenario {
-            Scenario::Ramp => self.ramp(note),
-            Scenario::Fleet => self.fleet(note),
+            Scenario::Ramp => self.ramp(),
+            Scenario::Fleet => self.fleet(),
             _ => self.single(),
         }
     }
 
     fn empty(&self) -> ScenarioOutcome {
-        ScenarioOutcome::new(self.scenario, self.options.duration)
+        ScenarioOutcome::new(self.scenario, self.arguments.duration)
     }
 
     fn single(&self) -> Result<ScenarioOutcome, Failure> {
@@ -121,14 +138,14 @@ impl Campaign<'_> {
     }
 
     fn setup(&self) -> Result<Setup, Failure> {
-        let (scenario, options) = (self.scenario, self.options);
-        let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), options.duration);
+        let (scenario, arguments) = (self.scenario, self.arguments);
+        let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), arguments.duration);
         let faults = |kind| {
-            let stages = match options.stages.as_slice() {
+            let stages = match arguments.stages.as_slice() {
                 [] => self.tested.stages.as_slice(),
                 stages => stages,
             };
-            Some((kind, stages.to_vec(), options.seed))
+            Some((kind, stages.to_vec(), arguments.seed))
         };
         match scenario {
             Scenario::Bursts => {
@@ -169,7 +186,7 @@ impl Campaign<'_> {
     }
 
     fn slow_stages(&self) -> impl Iterator<Item = String> {
-        let stages = match self.options.stages.as_slice() {
+        let stages = match self.arguments.stages.as_slice() {
             [] => &[StageId::Masking],
             stages => stages,
         };
@@ -190,18 +207,18 @@ impl Campaign<'_> {
         })
     }
 
-    fn ramp(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, Failure> {
+    fn ramp(&self) -> Result<ScenarioOutcome, Failure> {
         let rate_hz = |level: u32| RADAR_HZ * 2_f64.powf(f64::from(level) / f64::from(LEVELS));
         let most = (MOST_HZ.min(MOST_HZ / self.tested.period.as_secs_f64()) / RADAR_HZ).log2();
         let most = MOST_LEVELS.min((most * f64::from(LEVELS)) as u32);
-        let mut steps = Steps::new("scans/s", note);
+        let mut steps = Steps::new("scans/s", print::note);
         let passes = |level| steps.passes(|| self.step(rate_hz(level), rate_hz(level), 1));
         let found = largest(0, most, |level| level + LEVELS, passes)?;
         Ok(self.found(&found, rate_hz, steps, ("rate_hz", self.limits.rate_hz)))
     }
 
-    fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, Failure> {
-        let mut steps = Steps::new("radars", note);
+    fn fleet(&self) -> Result<ScenarioOutcome, Failure> {
+        let mut steps = Steps::new("radars", print::note);
         let passes = |radars| {
             steps.passes(|| match self.lacks_memory(radars) {
                 Some(reason) => Ok(Step::not_started(f64::from(radars), reason)),
@@ -216,7 +233,7 @@ impl Campaign<'_> {
         &self,
         found: &Found,
         load: impl Fn(u32) -> f64,
-        steps: Steps<'_>,
+        steps: Steps,
         (key, limit): (&'static str, Option<f64>),
     ) -> ScenarioOutcome {
         let best = found.best.map(&load);
@@ -241,7 +258,7 @@ impl Campaign<'_> {
     }
 
     fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, Failure> {
-        let duration = step_duration(self.options.duration, rate_hz);
+        let duration = step_duration(self.arguments.duration, rate_hz);
         let setups = (0..pipelines).map(|number| Setup {
             name: format!("{}-{number}", self.scenario),
             ..Setup::undisturbed(self.scenario, rate_hz, duration)

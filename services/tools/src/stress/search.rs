@@ -54,15 +54,15 @@ pub fn largest<E>(
     })
 }
 
-pub struct Steps<'a> {
+pub struct Steps {
     unit: &'static str,
-    note: &'a mut dyn FnMut(&str),
+    note: fn(String),
     pub all: Vec<Step>,
 }
 
-impl<'a> Steps<'a> {
+impl Steps {
     /// Returns no steps; `note` receives each, whose level is a number of these units.
-    pub fn new(unit: &'static str, note: &'a mut dyn FnMut(&str)) -> Self {
+    pub fn new(unit: &'static str, note: fn(String)) -> Self {
         Self {
             unit,
             note,
@@ -77,7 +77,7 @@ impl<'a> Steps<'a> {
     ) -> Result<bool, Failure> {
         for _ in 0..TRIES {
             let step = step()?;
-            (self.note)(&step.sentence(self.unit));
+            (self.note)(step.sentence(self.unit));
             let passed = step.passed;
             self.all.push(step);
             if passed {
@@ -88,7 +88,7 @@ impl<'a> Steps<'a> {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Step {
     /// Scans a second, or radars.
     pub level: f64,
@@ -108,11 +108,8 @@ impl Step {
     pub fn not_started(level: f64, reason: String) -> Self {
         Self {
             level,
-            passed: false,
-            due: 0,
-            dropped: 0,
-            p99_ms: None,
             reason: Some(reason),
+            ..Self::default()
         }
     }
 
@@ -158,6 +155,8 @@ pub fn step_duration(scenario: Duration, rate_hz: f64) -> Duration {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
     use super::*;
 
     #[test]
@@ -194,9 +193,10 @@ mod tests {
 
     #[test]
     fn a_level_that_fails_once_is_tried_again_and_one_that_fails_twice_has_failed() {
-        let mut noted = 0;
-        let mut note = |_: &str| noted += 1;
-        let mut steps = Steps::new("scans/s", &mut note);
+        static NOTED: AtomicUsize = AtomicUsize::new(0);
+        let mut steps = Steps::new("scans/s", |_| {
+            NOTED.fetch_add(1, Relaxed);
+        });
         let mut results = [false, true, false, false].into_iter();
         let mut step = || {
             let reason = "p99_ms 300.0, limit 250".to_owned();
@@ -210,6 +210,6 @@ mod tests {
         assert!(steps.passes(&mut step).is_ok_and(|passes| !passes));
         let tried: Vec<_> = steps.all.iter().map(|it| it.passed).collect();
         assert_eq!(tried, [false, true, false, false]);
-        assert_eq!(noted, 4);
+        assert_eq!(NOTED.load(Relaxed), 4);
     }
 }

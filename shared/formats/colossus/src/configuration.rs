@@ -41,6 +41,19 @@ pub struct Configuration {
 pub struct BadConfiguration(String);
 
 impl Configuration {
+    /// A radar of so many azimuths and bins, with four turns per second and the usual encoder.
+    pub fn usual(azimuth_samples: u16, range_in_bins: u16) -> Self {
+        Self {
+            azimuth_samples,
+            bin_size: 438,
+            range_in_bins,
+            encoder_size: 5600,
+            rotation_mhz: 4000,
+            range_resolution_m: Some(0.04381),
+            ..Self::default()
+        }
+    }
+
     /// Returns the depth of a range bin, m: the exact value of the protobuf if there is one,
     /// otherwise `bin_size`, which is rounded to 0.1 mm (0.04381 m becomes 0.0438).
     pub fn range_resolution_m(&self) -> f32 {

@@ -2,6 +2,7 @@
 //! Numbers are big-endian, but for the time of an azimuth, whose byte order depends on the radar's
 //! software.
 
+use crate::clock::ClockFormat;
 use crate::configuration::{self, Configuration};
 use crate::health::{self, Health};
 use crate::malformed::{Malformed, head};
@@ -83,6 +84,20 @@ pub struct Azimuth<'a> {
     pub split_seconds: [u8; 4],
     /// The powers, nearest bin first.
     pub powers: Powers<'a>,
+}
+
+impl<'a> Azimuth<'a> {
+    /// An azimuth with a byte per bin at this time, ns since 1970, in a radar's format.
+    pub fn at(encoder: u16, stamp_ns: i64, format: ClockFormat, powers: &'a [u8]) -> Self {
+        let (seconds, split_seconds) = format.fields(stamp_ns);
+        Self {
+            sweep_counter: 0,
+            encoder,
+            seconds,
+            split_seconds,
+            powers: Powers::Eight(powers),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

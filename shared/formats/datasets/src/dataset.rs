@@ -157,6 +157,13 @@ pub trait Dataset: Send {
     /// Decodes a scan into `slot`, whose slices must be at least as long as [`Dataset::limits`].
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
+    /// Decodes a scan into memory of its own.
+    fn scan(&mut self, index: usize) -> Result<OwnedScan, ReadError> {
+        let mut scan = OwnedScan::with_limits(self.limits());
+        scan.geometry = self.read(index, scan.slot())?;
+        Ok(scan)
+    }
+
     /// Reads the samples of another sensor that the recording itself has, on the topic of this
     /// name, else on the only one: in the sensor's own axes and on its own clock, in the order of
     /// the recording. `None` without one.
@@ -231,10 +238,8 @@ fn open_found(
 /// Checks by the first scan of a recording that its radar measures the velocity by Doppler: see
 /// [`check_chirps`]. A scan that cannot be read is reported where it is played.
 pub fn check_first_scan(dataset: &mut dyn Dataset) -> Result<(), NoDoppler> {
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    let Ok(geometry) = dataset.read(dataset.first(), scan.slot()) else {
-        return Ok(());
-    };
-    scan.geometry = geometry;
-    check_chirps(&scan.view())
+    match dataset.scan(dataset.first()) {
+        Ok(scan) => check_chirps(&scan.view()),
+        Err(_) => Ok(()),
+    }
 }

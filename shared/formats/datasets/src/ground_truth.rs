@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 
 pub use poses::{write_kitti, write_tum, write_tum_pose};
 
-use gyre_geometry::Pose;
 use gyre_radar::trajectory::Trajectory;
 use gyre_storage::quoted;
 
@@ -223,11 +222,4 @@ fn stamped<'a, T>(
         values.push(value);
     }
     Ok((stamps, values))
-}
-
-fn timed((stamps, poses): (Vec<i64>, Vec<Pose>)) -> Trajectory {
-    Trajectory {
-        stamp_ns: Some(stamps),
-        poses,
-    }
 }

@@ -107,9 +107,8 @@ impl SampleLog {
     /// Reads the log of a live receiver of fixes during a run. Lines without a fix are allowed. A
     /// run without usable fixes continues without them, and keeps the reason.
     pub fn received(path: &Path) -> Self {
-        let mut received = ReceivedFixes::new(path);
-        match received.read_on() {
-            Ok(()) => received.log(),
+        match ReceivedFixes::read(path) {
+            Ok(received) => received.log(),
             Err(error) => Self {
                 unusable: Some(error.to_string()),
                 ..Self::new(SampleKind::Gnss, path)
@@ -172,12 +171,15 @@ impl SampleLog {
             true => "east_m,north_m",
             false => "latitude_deg,longitude_deg",
         };
-        let row = |fix: &Sample| {
-            let (ns, [a, b, altitude_m, sigma_m, ..]) = (fix.stamp_ns, fix.values);
-            format!("{ns},{a},{b},{altitude_m},{}\n", sigma_m.max(0.0))
-        };
-        let rows: String = fixes.iter().map(row).collect();
+        let rows: String = fixes.iter().map(Self::row_of_fix).collect();
         format!("stamp_ns,{at},altitude_m,sigma_m\n{rows}")
+    }
+
+    /// Returns the row of a fix in such a table: with the shortest texts that are read back as the
+    /// same numbers.
+    pub fn row_of_fix(fix: &Sample) -> String {
+        let (ns, [a, b, altitude_m, sigma_m, ..]) = (fix.stamp_ns, fix.values);
+        format!("{ns},{a},{b},{altitude_m},{}\n", sigma_m.max(0.0))
     }
 
     /// Returns the fixes on the radar's clock, with the configured uncertainty where the log has
@@ -231,7 +233,7 @@ impl SampleLog {
         });
         let repaired = match kind.of {
             SampleKind::Gnss => {
-                faults.without_fix = raw.unmeasured;
+                (faults.lost, faults.without_fix) = (raw.lost, raw.unmeasured);
                 let (fixes, plane) = fixes::repaired(samples, form.is_plane, faults);
                 log.plane = plane;
                 let named = faults.named(kind.of).join(", ");

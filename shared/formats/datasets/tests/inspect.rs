@@ -72,11 +72,8 @@ fn a_late_ground_truth_is_detected_with_a_trajectory() {
     };
     let truth = read_trajectory(&root.join("ground_truth.tum")).unwrap();
     // Like an odometry result: every fifth pose, 4 Hz.
-    let stamps = truth.stamp_ns.unwrap().into_iter().step_by(5);
-    let result = Trajectory {
-        stamp_ns: Some(stamps.collect()),
-        poses: truth.poses.into_iter().step_by(5).collect(),
-    };
+    let stamps = truth.stamp_ns.unwrap().into_iter().step_by(5).collect();
+    let result = Trajectory::timed(stamps, truth.poses.into_iter().step_by(5).collect());
     let report = report("radiate-2019-02-12", Some(&result)).unwrap();
     let delay_s = |name: &str| {
         let truths = at(&report, "/ground_truths").as_array().unwrap();

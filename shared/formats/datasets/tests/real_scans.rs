@@ -6,7 +6,7 @@ use gyre_datasets::{Dataset, DatasetOptions, Format, open, read_trajectory};
 use gyre_geometry::{OwnedScan, Sense, scan::flag};
 use gyre_radar::{DopplerEstimator, lost::stale_rows};
 
-use crate::common::{read, real};
+use crate::common::real;
 
 fn opened(folder: &str) -> Option<Box<dyn Dataset>> {
     Some(open(&real(folder)?, &DatasetOptions::default()).unwrap())
@@ -45,7 +45,7 @@ fn oxford_scans_decode_in_place_with_true_azimuths_and_the_times_of_the_ground_t
     let root = real("oxford-2019-01-10-14-36-48").unwrap();
     let truth = read_trajectory(&root.join("gt/radar_odometry.csv")).unwrap();
     for (index, truth_ns) in truth.stamp_ns.unwrap().into_iter().enumerate() {
-        let scan = read(oxford.as_mut(), index).unwrap();
+        let scan = oxford.scan(index).unwrap();
         assert_sweep(oxford.as_ref(), index, &scan, 5_000_000);
         let (width, height, pixels) = decoded(oxford.file(index));
         assert_eq!((width, height), (3779, 400));
@@ -76,7 +76,7 @@ fn radiate_images_are_transposed_and_the_clock_is_uniform() {
     assert_eq!((radiate.format(), radiate.len()), (Format::Radiate, 466));
     assert!(radiate.is_transposed());
     for index in [0, 100, 330, 465] {
-        let scan = read(radiate.as_mut(), index).unwrap();
+        let scan = radiate.scan(index).unwrap();
         assert_sweep(radiate.as_ref(), index, &scan, 0);
         let (width, height, pixels) = decoded(radiate.file(index));
         assert_eq!((width, height, scan.geometry.bins), (400, 576, 576));
@@ -109,7 +109,7 @@ fn lost_azimuths_of_images_without_metadata_are_counted() {
         let Some(mut scans) = opened(folder) else {
             return;
         };
-        let mut stale = |index| stale_rows(&read(scans.as_mut(), index).unwrap().view());
+        let mut stale = |index| stale_rows(&scans.scan(index).unwrap().view());
         let counts: Vec<usize> = (0..expected[0]).map(&mut stale).collect();
         // Whichever scan is read first.
         for index in [counts.len() - 1, counts.len() / 2, 0] {
@@ -137,7 +137,7 @@ fn boreas_rt_is_detected_by_its_chirps_and_fomo_by_its_name() {
         };
         assert_eq!((scans.format(), scans.len()), (format, 1));
         assert_eq!(scans.encoder_counts(), Some(5600));
-        let scan = read(scans.as_mut(), 0).unwrap();
+        let scan = scans.scan(0).unwrap();
         // The name of that of Boreas is no time.
         assert_sweep(scans.as_ref(), 0, &scan, 1_000_000);
         let geometry = scan.geometry;
@@ -170,9 +170,9 @@ fn both_forms_of_mulran_have_the_same_azimuths_and_times() {
     let period_ns = rows.period_ns();
     assert!((period_ns - 249_600_000).abs() < 100_000, "{period_ns}");
     for index in 0..rows.len() {
-        let one = read(rows.as_mut(), index).unwrap();
+        let one = rows.scan(index).unwrap();
         assert_sweep(rows.as_ref(), index, &one, 1_000_000);
-        let Ok(other) = read(raw.as_mut(), index) else {
+        let Ok(other) = raw.scan(index) else {
             assert!(index >= raw.len());
             continue;
         };
@@ -197,7 +197,7 @@ fn a_scan_of_boreas_rt_says_that_its_vehicle_stands() {
         doppler_s: Some(0.049),
         ..DatasetOptions::default()
     };
-    let scan = read(open(&folder, &options).unwrap().as_mut(), 0).unwrap();
+    let scan = open(&folder, &options).unwrap().scan(0).unwrap();
     let found = DopplerEstimator::default().estimate(&scan.view(), 5.0);
     let found = found.unwrap();
     let [ahead, left] = found.value;

@@ -183,8 +183,7 @@ fn trajectory() -> impl Strategy<Value = Trajectory> {
             stamps.push(stamp);
             poses.push(Isometry2::new(Vector2::new(x, y), yaw));
         }
-        let stamp_ns = Some(stamps);
-        Trajectory { stamp_ns, poses }
+        Trajectory::timed(stamps, poses)
     })
 }
 

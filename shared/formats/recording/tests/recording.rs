@@ -2,61 +2,27 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod written;
+
 use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
 
-use bytemuck::{Zeroable, bytes_of};
-use gyre_contract::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
+use gyre_contract::{Item, MotionHeader, PoseHeader, RotationHeader};
 use gyre_datasets::DatasetOptions;
-use gyre_geometry::OwnedScan;
 use gyre_recording::{
     Head, Incoming, LogLine, Positions, Recording, RecordingWriter, Split, SplitWriter,
     file::McapFile, open, open_recording,
 };
 use mcap::records::{MessageHeader, Metadata, Record, op};
+use written::{head, item, message};
 
 const SCANS: u64 = 6;
-const START_NS: i64 = 1_549_986_607_000_000_000;
 
-fn item(seq: u64) -> Item {
-    Item {
-        seq,
-        scan: seq + 10,
-        previous_scan: seq + 10,
-        published: seq,
-        stamp_ns: START_NS + seq as i64 * 250_000_000,
-        ..Item::default()
-    }
-}
-
-/// A scan with metadata before each row, as in images of Oxford.
 fn scan(seq: u64) -> Incoming {
-    let mut header = ScanHeader {
-        item: item(seq),
-        azimuths: 4,
-        bins: 10,
-        stride: 21,
-        first_byte: 11,
-        range_resolution_m: 0.5,
-        range_offset_m: -0.25,
-        clockwise: 1,
-        ..ScanHeader::zeroed()
-    };
-    header.azimuth_stamp_ns[..4].fill(header.item.stamp_ns);
-    header.azimuth_rad[..4].copy_from_slice(&[0.0, 1.5, 3.0, 4.5]);
-    Incoming {
-        topic: "scan",
-        header: bytes_of(&header).to_vec(),
-        payload: (0..11 + 3 * 21 + 10)
-            .map(|byte| (byte * 7 + seq as i32) as u8)
-            .collect(),
-        received_ns: START_NS,
-        missed: 0,
-        skipped: None,
-    }
+    written::scan(item(seq))
 }
 
 fn pose(seq: u64) -> Incoming {
@@ -66,24 +32,8 @@ fn pose(seq: u64) -> Incoming {
         ..PoseHeader::default()
     };
     Incoming {
-        topic: "pose",
-        header: bytes_of(&header).to_vec(),
-        payload: Vec::new(),
-        received_ns: START_NS,
         missed: 2,
-        skipped: None,
-    }
-}
-
-fn head(id: &str, part: usize) -> Head {
-    Head {
-        id: id.to_owned(),
-        part,
-        configuration: "[dataset]\nformat = \"radiate\"\nazimuth_eccentricity_rad = 0.0025\n"
-            .to_owned(),
-        topics: ["scan", "pose"].map(str::to_owned).to_vec(),
-        scan_bytes: 128,
-        mode: "lossless".to_owned(),
+        ..message("pose", &header)
     }
 }
 
@@ -152,12 +102,11 @@ fn a_dataset_has_the_recorded_scans_under_their_numbers_and_names_the_missing_on
     let (_folder, path) = recorded(&[0, 1, 3]);
     let mut dataset = open(&path, &DatasetOptions::default()).unwrap();
     assert_eq!((dataset.first(), dataset.len()), (10, 14));
-    let mut own = OwnedScan::with_limits(dataset.limits());
-    own.geometry = dataset.read(11, own.slot()).unwrap();
+    let own = dataset.scan(11).unwrap();
     assert_eq!(own.geometry.range_offset_m, -0.25);
     assert_eq!(own.azimuth_rad[..4], [0.0, 1.5, 3.0, 4.5]);
     assert_eq!(own.view().row(2), &scan(1).payload[11 + 42..][..10]);
-    let missing = dataset.read(12, own.slot()).unwrap_err();
+    let missing = dataset.scan(12).unwrap_err();
     assert!(missing.to_string().contains("has no scan 12"), "{missing}");
     let notes = dataset.notes().join(" ");
     assert!(notes.contains("1 of the scans 10 to 13"), "{notes}");
@@ -270,14 +219,7 @@ fn of(generation: u32, numbered_from: u64, seq: u64, scan: u64) -> Incoming {
         },
         ..MotionHeader::default()
     };
-    Incoming {
-        topic: "motion",
-        header: bytes_of(&header).to_vec(),
-        payload: Vec::new(),
-        received_ns: START_NS,
-        missed: 0,
-        skipped: None,
-    }
+    message("motion", &header)
 }
 
 #[test]
@@ -366,9 +308,8 @@ fn whatever_is_damaged_of_a_chunk_its_scan_alone_cannot_be_read_and_the_place_is
             assert!(damage.contains("is damaged at byte"), "{damage}");
             assert!(dataset.notes().join(" ").contains(&damage));
             assert_eq!((dataset.first(), dataset.len()), (10, 16));
-            let mut own = OwnedScan::with_limits(dataset.limits());
-            let scans = dataset.scans().map(|scan| dataset.read(scan, own.slot()));
-            assert_eq!(scans.filter(Result::is_ok).count(), read, "{damage}");
+            let scans = dataset.scans().filter(|scan| dataset.scan(*scan).is_ok());
+            assert_eq!(scans.count(), read, "{damage}");
         }
     }
     fs::write(&path, &whole[..chunks[4] + 9]).unwrap();
@@ -381,7 +322,7 @@ fn whatever_is_damaged_of_a_chunk_its_scan_alone_cannot_be_read_and_the_place_is
 fn write_chunk(path: &Path, table: BTreeMap<String, String>, messages: u32) {
     let head = path.with_extension("head");
     let _ = fs::remove_file(&head);
-    RecordingWriter::create(&head, &self::head("a", 1))
+    RecordingWriter::create(&head, &written::head("a", 1))
         .unwrap()
         .finish()
         .unwrap();

@@ -114,16 +114,4 @@ impl NavSatFix {
         fix.values[4] = f64::from(status_is_unknown);
         (self.status.status >= FIX || status_is_unknown).then_some(fix)
     }
-
-    /// Returns the line that a live receiver would send: its time, ns, latitude and longitude,
-    /// degrees, and the standard deviation, m, or 0; without a fix the time alone.
-    pub fn line(&self, received_ns: i64) -> String {
-        match self.fix(received_ns) {
-            Some(fix) => {
-                let (stamp_ns, [latitude, longitude, _, sigma_m, ..]) = (fix.stamp_ns, fix.values);
-                format!("{stamp_ns},{latitude},{longitude},{sigma_m}")
-            }
-            None => format!("{},,", self.header.stamp_or(received_ns)),
-        }
-    }
 }

@@ -110,10 +110,9 @@ pub trait SensorConfig {
     /// The address for receiving datagrams.
     fn listen(&self) -> &str;
 
-    /// Returns whether a run receives datagrams at that address. The source passes fixes of ROS 2
-    /// on to there.
+    /// Returns whether a run receives datagrams at that address.
     fn receives(&self) -> bool {
-        self.kind() == SensorKind::Udp || self.of() == SampleKind::Gnss && self.kind().is_live()
+        self.kind() == SensorKind::Udp
     }
 
     /// Longest time for which a scan of a live radar waits for its samples, ms.
@@ -123,6 +122,12 @@ pub trait SensorConfig {
 
     /// Delay of its stamps against the radar's, s.
     fn delay_s(&self) -> f64;
+
+    /// The scale that is applied to the samples, and the farthest that their scale beyond it can be
+    /// from 1.
+    fn scale(&self) -> (f64, f64) {
+        (1.0, f64::INFINITY)
+    }
 
     /// Longest time between two samples over which a rate is interpolated, s.
     fn max_gap_s(&self) -> f64 {
@@ -337,6 +342,10 @@ impl GyroConfig {
 }
 
 sensor_config! { GyroConfig is Gyro on "/imu/data":
+    fn scale(&self) -> (f64, f64) {
+        (self.scale, self.max_scale_error())
+    }
+
     fn validate(&self) -> Result<(), SettingError> {
         check_bounds! { self, "gyro":
             delay_s in DELAY,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bounds::{SHARE, SettingError, check},
-    samples::{Evidence, WheelsConfig},
+    samples::Evidence,
 };
 
 /// Configuration of the velocity by Doppler: section `[doppler]`. Of radars whose rising and
@@ -51,16 +51,6 @@ impl DopplerConfig {
 
     pub fn is_used(&self) -> bool {
         self.kind != DopplerKind::None
-    }
-
-    /// Returns wheels right below the radar that know their scale as well: what weighs the
-    /// distance by wheels against the radar weighs the displacement by Doppler too.
-    pub fn as_wheels(&self) -> WheelsConfig {
-        WheelsConfig {
-            radar_ahead_m: 0.0,
-            scale_sigma: self.scale_sigma,
-            ..WheelsConfig::default()
-        }
     }
 
     /// Returns the displacement ahead and to the left, m, along the heading in the middle, between

@@ -30,8 +30,7 @@ pub struct GnssConfig {
     pub topic: Option<String>,
     /// The address and port for receiving datagrams of a live receiver, for `kind = "udp"`: lines
     /// of a stamp (ns since 1970), latitude and longitude (degrees) and, if it is known, the
-    /// standard deviation along each axis (m), with commas between. For `kind = "ros2"` those that
-    /// the source passes on.
+    /// standard deviation along each axis (m), with commas between.
     pub listen: String,
     /// Delay of the stamps of the fixes against the radar's, s: it is subtracted from them.
     pub delay_s: f64,

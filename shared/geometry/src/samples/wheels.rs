@@ -13,6 +13,8 @@ use crate::{
     },
 };
 
+/// Least standard deviation of the scale around 1: the settings may be for other tyres.
+const TYRES: f64 = 0.02;
 /// Standard deviation of a speed by the rounding to a step, m/s.
 const NOISE_MPS: f64 = 0.02;
 
@@ -76,6 +78,10 @@ impl Default for WheelsConfig {
 }
 
 sensor_config! { WheelsConfig is Wheels on "/odom":
+    fn scale(&self) -> (f64, f64) {
+        (self.scale, 4.0 * self.scale_sigma.max(TYRES))
+    }
+
     fn validate(&self) -> Result<(), SettingError> {
         check_bounds! { self, "wheels":
             delay_s in DELAY,

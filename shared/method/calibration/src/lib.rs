@@ -32,7 +32,7 @@ pub use picture::svg;
 pub use revisits::Revisit;
 pub use section::toml;
 pub use sensor::{
-    ClockError, Compared, Kind, SensorCalibration, SensorSettings, calibrate_sensor, delay, kinds,
+    ClockError, Compared, Kind, SensorCalibration, SensorSettings, calibrate_sensor, compare, kinds,
 };
 pub use study::Study;
 

@@ -11,7 +11,7 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use delay::{Compared, delay};
+pub use delay::{Compared, compare};
 pub use found::{SensorCalibration, SensorSettings};
 pub use kinds::Kind;
 

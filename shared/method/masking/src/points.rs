@@ -94,11 +94,7 @@ mod tests {
     /// made with `twist`.
     fn share_that_meets(twist: Twist, sense: Sense, frame: RasterFrame) -> f32 {
         let scan = spots(sense);
-        let config = RasterConfig {
-            n: frame.n,
-            cell_m: frame.cell_m,
-            ..RasterConfig::default()
-        };
+        let config = RasterConfig::of(frame.n, frame.cell_m);
         let mut raster = Array2::zeros((frame.n, frame.n));
         Rasteriser::new(&config)
             .unwrap()
@@ -122,11 +118,7 @@ mod tests {
 
     #[test]
     fn points_lie_in_cells_with_power() {
-        let twist = Twist {
-            vx_mps: 25.0,
-            vy_mps: 1.0,
-            yaw_rate_radps: 0.6,
-        };
+        let twist = Twist::from([25.0, 1.0, 0.6]);
         let moving = RasterFrame {
             n: 401,
             cell_m: 0.5,

@@ -1,30 +1,16 @@
 use super::*;
-use gyre_geometry::{OwnedScan, ScanLimits, SweepGeometry, scan::flag};
+use gyre_geometry::OwnedScan;
 use ndarray::Array2;
+
+#[path = "../tests/common/sweep.rs"]
+mod sweep;
 
 pub(crate) const AZIMUTHS: usize = 400;
 const BINS: usize = 300;
 
 /// An empty scan of a sweep of 0.25 s.
 pub(crate) fn empty(bins: usize) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: AZIMUTHS * bins,
-        azimuths: AZIMUTHS,
-    });
-    scan.geometry = SweepGeometry {
-        azimuths: AZIMUTHS,
-        bins,
-        stride: bins,
-        range_resolution_m: 0.2,
-        doppler_s: 0.04,
-        ..SweepGeometry::default()
-    };
-    for azimuth in 0..AZIMUTHS {
-        scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
-        scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
-        scan.flags[azimuth] = flag::MEASURED;
-    }
-    scan
+    sweep::of(AZIMUTHS, bins, 0.2)
 }
 
 /// A scan of a circular wall, 4 m deep, with its middle at 40 m. All rows have one time.
@@ -38,16 +24,9 @@ fn wall() -> OwnedScan {
 
 /// The mean range of the power straight ahead at 20 m/s, m.
 fn wall_ahead_m(config: &MaskingConfig) -> f32 {
-    let raster = RasterConfig {
-        n: 401,
-        cell_m: 0.25,
-        ..RasterConfig::default()
-    };
+    let raster = RasterConfig::of(401, 0.25);
     let mut masker = Masker::new(&raster, &PointsConfig::default(), config).unwrap();
-    let twist = Twist {
-        vx_mps: 20.0,
-        ..Twist::default()
-    };
+    let twist = Twist::from([20.0, 0.0, 0.0]);
     let mut cells = Array2::zeros((401, 401));
     let wall = wall();
     let sweep = Sweep {

@@ -27,11 +27,7 @@ fn cards() -> Vec<PathBuf> {
 }
 
 fn trained_raster(card: &Card) -> RasterConfig {
-    RasterConfig {
-        n: card.raster.n,
-        cell_m: card.raster.cell_m,
-        ..RasterConfig::default()
-    }
+    RasterConfig::of(card.raster.n, card.raster.cell_m)
 }
 
 #[test]
@@ -88,11 +84,7 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
 fn simulated_scans() -> [OwnedScan; 2] {
     let drive = SimulatedDrive::new(&SimulationConfig::default()).unwrap();
     let mut dataset = drive.open(&DatasetOptions::default()).unwrap();
-    [0, 1].map(|number| {
-        let mut scan = OwnedScan::with_limits(dataset.limits());
-        scan.geometry = dataset.read(number, scan.slot()).unwrap();
-        scan
-    })
+    [0, 1].map(|number| dataset.scan(number).unwrap())
 }
 
 /// The rasters of scans, scans x n x n.

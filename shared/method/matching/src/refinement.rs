@@ -89,6 +89,8 @@ pub struct Witnessed {
     pub verdict: Verdict,
     /// The turn (rad), the distance (m) or the heading (rad) that it measured.
     pub measured: f64,
+    /// The same turn or distance by the registration alone; zero without a match.
+    pub registered: f64,
     /// True value over the measured one.
     pub scale: f64,
     pub scale_sigma: f64,
@@ -190,7 +192,7 @@ impl Refiner {
         let uncertainty = Uncertainty::before(&scan, map, state, predictions, config);
         let accepted = self.accept_or_predict(&scan, &mut best, &uncertainty);
         self.observe_headings(&scan, &accepted.pose.motion);
-        let witnesses = self.witnessed(&scan);
+        let witnesses = self.witnessed(&scan, &accepted);
         let report = self.report(&scan, &accepted);
         self.update(&scan, &best, &accepted);
         Refined {

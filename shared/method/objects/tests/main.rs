@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, TAU};
 
 use gyre_contract::Object;
-use gyre_geometry::{Pose, SparsePoint, Twist, pose};
+use gyre_geometry::{Pose, SparsePoint, pose};
 use gyre_objects::{ObjectTracker, PlacedScan};
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::{Rng, SeedableRng};
@@ -105,10 +105,7 @@ impl Scene {
         let placed = PlacedScan {
             stamp_ns: (self.time_s() * 1e9) as i64,
             pose: self.sensor(0.0),
-            twist: Twist {
-                vx_mps: self.sensor_mps,
-                ..Twist::default()
-            },
+            twist: [self.sensor_mps, 0.0, 0.0].into(),
         };
         let points: Vec<SparsePoint> = points
             .iter()

@@ -255,10 +255,7 @@ mod tests {
             let speed = 8.0 + 3.0 * (0.37 * t).sin() + 2.0 * (1.1 * t).cos();
             now *= pose(speed * 0.05, 0.0, sign * 0.05 * 0.3 * (0.53 * t).sin());
         }
-        Trajectory {
-            stamp_ns: Some(stamps),
-            poses,
-        }
+        Trajectory::timed(stamps, poses)
     }
 
     #[test]
@@ -294,10 +291,7 @@ mod tests {
                     let turning = (k as f64 * 0.25 / 7.5).fract() < 0.4;
                     x += 0.25 * if turning { 4.0 } else { 9.5 };
                 }
-                Trajectory {
-                    stamp_ns: Some(stamps),
-                    poses,
-                }
+                Trajectory::timed(stamps, poses)
             };
             let found = clock_offset(&block(0, 3.0), &block(late_ms, 0.0)).unwrap();
             assert!(

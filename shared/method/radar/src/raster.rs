@@ -80,6 +80,15 @@ impl Default for RasterConfig {
 }
 
 impl RasterConfig {
+    /// So many cells of this size per side, otherwise as by default.
+    pub fn of(n: usize, cell_m: f32) -> Self {
+        Self {
+            n,
+            cell_m,
+            ..Self::default()
+        }
+    }
+
     pub fn validate(&self) -> Result<(), SettingError> {
         let cells = ([1.0, MAX_CELLS_PER_SIDE as f64], "1 to 4096");
         check("raster", "n", self.n as f64, cells)?;

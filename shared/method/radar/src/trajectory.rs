@@ -13,6 +13,16 @@ impl Trajectory {
     /// Files round stamps by less than this: see [`Trajectory::near`].
     pub const ROUNDING_NS: u64 = 1_000_000;
 
+    pub fn timed(stamps_ns: Vec<i64>, poses: Vec<Pose>) -> Self {
+        let stamp_ns = Some(stamps_ns);
+        Self { stamp_ns, poses }
+    }
+
+    pub fn untimed(poses: Vec<Pose>) -> Self {
+        let stamp_ns = None;
+        Self { stamp_ns, poses }
+    }
+
     pub fn len(&self) -> usize {
         self.poses.len()
     }
@@ -83,10 +93,7 @@ mod tests {
     #[test]
     fn times_within_the_tolerance_are_clamped() {
         let poses = [1.0, 2.0, 4.0].map(|x| pose(x, 0.0, 0.0)).to_vec();
-        let trajectory = Trajectory {
-            stamp_ns: Some(vec![0, 100, 150]),
-            poses,
-        };
+        let trajectory = Trajectory::timed(vec![0, 100, 150], poses);
         let x = |stamp_ns| trajectory.near(stamp_ns, 5).map(|pose| pose.translation.x);
         assert_eq!(
             [x(-6), x(-5), x(50), x(155), x(156)],

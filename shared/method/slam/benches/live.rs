@@ -5,7 +5,7 @@
 
 use std::{f64::consts::TAU, fs, path::Path, time::Duration};
 
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
+use gyre_geometry::{Pose, SparsePoint, UncertainMotion, pose};
 use gyre_matching::RefinementConfig;
 use gyre_slam::{
     EstimatorKind, Keyframe, LoopCandidate, LoopCloser, LoopOutcome, Place, Query, RecordLog,
@@ -164,16 +164,12 @@ fn write_logs(out: &Path) -> Vec<Query> {
 }
 
 fn keyframe(index: usize, pose: UncertainMotion, motion: UncertainMotion) -> Keyframe {
+    let points = vec![SparsePoint::default(); POINTS];
     Keyframe {
-        seq: 4 * index as u64,
-        scan: 4 * index as u64,
         stamp_ns: index as i64 * 1_000_000_000,
-        pose,
         motion,
-        noise: Matrix3::zeros(),
-        twist: Twist::default(),
         path_m: 2.0 * index as f64,
-        points: vec![SparsePoint::default(); POINTS],
+        ..Keyframe::standing(4 * index as u64, pose, points)
     }
 }
 

@@ -219,15 +219,12 @@ impl Fixes {
 
     fn offset(&self, keyframes: &[Stamped]) -> Option<ClockOffset> {
         let place = |fix: &GnssFix| Pose::translation(fix.east_m, fix.north_m);
-        let fixes = Trajectory {
-            stamp_ns: Some(self.fixes.iter().map(|fix| fix.stamp_ns).collect()),
-            poses: self.fixes.iter().map(place).collect(),
-        };
+        let stamps = self.fixes.iter().map(|fix| fix.stamp_ns).collect();
+        let fixes = Trajectory::timed(stamps, self.fixes.iter().map(place).collect());
         let lever = Pose::translation(self.lever_m.x, self.lever_m.y);
-        let antenna = Trajectory {
-            stamp_ns: Some(keyframes.iter().map(|it| it.stamp_ns).collect()),
-            poses: keyframes.iter().map(|it| it.odometry * lever).collect(),
-        };
+        let poses = keyframes.iter().map(|it| it.odometry * lever).collect();
+        let stamps = keyframes.iter().map(|it| it.stamp_ns).collect();
+        let antenna = Trajectory::timed(stamps, poses);
         let found = clock_offset(&fixes, &antenna)?;
         // A motion of the fixes at t equals the radar's motion at t + delay_s.
         Some(ClockOffset {
@@ -239,10 +236,7 @@ impl Fixes {
 
     /// Returns whether an offset moves the vehicle by more than the noise of fixes.
     fn is_wrong(&self, clock: &ClockOffset, keyframes: &[Stamped]) -> bool {
-        let path = Trajectory {
-            stamp_ns: None,
-            poses: keyframes.iter().map(|it| it.odometry).collect(),
-        };
+        let path = Trajectory::untimed(keyframes.iter().map(|it| it.odometry).collect());
         let seconds = match keyframes {
             [first, .., last] => (last.stamp_ns - first.stamp_ns) as f64 * 1e-9,
             _ => return false,

@@ -48,6 +48,21 @@ struct Fixed {
 }
 
 impl Keyframe {
+    /// A keyframe of a sensor that has not moved, at time 0.
+    pub fn standing(seq: u64, pose: UncertainMotion, points: Vec<SparsePoint>) -> Self {
+        Self {
+            seq,
+            scan: seq,
+            stamp_ns: 0,
+            pose,
+            motion: UncertainMotion::identity(),
+            noise: Matrix3::zeros(),
+            twist: Twist::default(),
+            path_m: 0.0,
+            points,
+        }
+    }
+
     /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
     /// checked: the checksum covers the whole record. Panics beyond the last keyframe.
     pub fn without_points(
@@ -102,11 +117,7 @@ impl Record for Keyframe {
             pose: uncertain(fixed.pose, &fixed.pose_covariance),
             motion: uncertain(fixed.motion, &fixed.motion_covariance),
             noise: covariance::unpack(&fixed.noise),
-            twist: Twist {
-                vx_mps: fixed.twist[0],
-                vy_mps: fixed.twist[1],
-                yaw_rate_radps: fixed.twist[2],
-            },
+            twist: fixed.twist.into(),
             path_m: fixed.path_m,
             points: points.collect(),
         })
@@ -128,19 +139,13 @@ mod tests {
 
     fn keyframe() -> Keyframe {
         Keyframe {
-            seq: 7,
             scan: 9,
             stamp_ns: -5,
-            pose: uncertain(),
             motion: uncertain(),
             noise: uncertain().covariance,
-            twist: Twist {
-                vx_mps: 10.0,
-                vy_mps: 0.1,
-                yaw_rate_radps: -0.2,
-            },
+            twist: [10.0, 0.1, -0.2].into(),
             path_m: 12.5,
-            points: vec![SparsePoint::from([1.0, 2.0, 0.1, 0.5, 0.04]); 3],
+            ..Keyframe::standing(7, uncertain(), vec![[1.0, 2.0, 0.1, 0.5, 0.04].into(); 3])
         }
     }
 

@@ -12,6 +12,12 @@ fn closer() -> LoopCloser {
     LoopCloser::new(SUBMAP_REACH_M, &RefinementConfig::default(), 400).unwrap()
 }
 
+fn encoded(record: &impl Record) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    record.encode(&mut bytes);
+    bytes
+}
+
 #[derive(Clone, Default, PartialEq)]
 struct Logs {
     places: Vec<Vec<u8>>,
@@ -22,14 +28,10 @@ impl Logs {
     fn advance(&mut self, closer: &mut LoopCloser, drive: &Drive) {
         let mut read = |index: usize| Ok::<_, Infallible>(drive.keyframes[index].clone());
         while let Some(place) = closer.describe(&mut read).unwrap() {
-            let mut bytes = Vec::new();
-            place.encode(&mut bytes);
-            self.places.push(bytes);
+            self.places.push(encoded(&place));
         }
         while let Some(query) = closer.close(&mut read).unwrap() {
-            let mut bytes = Vec::new();
-            query.encode(&mut bytes);
-            self.queries.push(bytes);
+            self.queries.push(encoded(&query));
         }
     }
 

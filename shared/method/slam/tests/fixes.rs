@@ -2,14 +2,16 @@
 //! they came.
 
 use gyre_geometry::{
-    Pose, Twist, UncertainMotion, interpolate, pose,
+    Pose, interpolate, pose,
     samples::{GnssConfig, GnssFix},
 };
 use gyre_slam::{EstimatorKind, FixRefusal, Fixes, Keyframe, TrajectoryEstimator};
-use nalgebra::{Matrix3, Point2, Vector3};
+use nalgebra::Point2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+
+use crate::common::reckoned;
 
 const SECOND_NS: i64 = 1_000_000_000;
 /// Standard deviations of a motion of 2 m.
@@ -30,46 +32,24 @@ struct Drive {
 
 impl Drive {
     fn new(keyframes: usize, seed: u64) -> Self {
+        let (mut stamps, mut truth) = (vec![0], vec![Pose::identity()]);
+        for k in 1..keyframes {
+            let along = k as f64 / 25.0;
+            let turn = 0.04 * (along.sin() + 0.6 * (0.37 * along).cos());
+            let speed_mps = 8.0 + 4.0 * (0.07 * k as f64).sin();
+            let stop_s = if k == keyframes / 2 { 20.0 } else { 0.0 };
+            stamps.push(stamps[k - 1] + ((2.0 / speed_mps + stop_s) * 1e9) as i64);
+            truth.push(truth[k - 1] * pose(2.0, 0.0, turn));
+        }
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let covariance = Matrix3::from_diagonal(&Vector3::from(SIGMA.map(|sigma| sigma * sigma)));
-        let (mut stamps, mut truth, mut keyframes_) = (vec![0], vec![Pose::identity()], Vec::new());
-        let mut reckoned = UncertainMotion::identity();
-        for k in 0..keyframes {
-            let mut motion = UncertainMotion::identity();
-            if k > 0 {
-                let along = k as f64 / 25.0;
-                let exact = pose(2.0, 0.0, 0.04 * (along.sin() + 0.6 * (0.37 * along).cos()));
-                let error: [f64; 3] = SIGMA.map(|sigma| {
-                    let normal: f64 = StandardNormal.sample(&mut random);
-                    sigma * normal
-                });
-                let measured = exact * pose(error[0], error[1], error[2]);
-                motion = UncertainMotion {
-                    motion: measured,
-                    covariance,
-                };
-                let speed_mps = 8.0 + 4.0 * (0.07 * k as f64).sin();
-                let stop_s = if k == keyframes / 2 { 20.0 } else { 0.0 };
-                stamps.push(stamps[k - 1] + ((2.0 / speed_mps + stop_s) * 1e9) as i64);
-                truth.push(truth[k - 1] * exact);
-            }
-            reckoned = reckoned.then(&motion).normalized();
-            keyframes_.push(Keyframe {
-                seq: k as u64,
-                scan: k as u64,
-                stamp_ns: stamps[k],
-                pose: reckoned,
-                motion: motion.normalized(),
-                noise: Matrix3::zeros(),
-                twist: Twist::default(),
-                path_m: 2.0 * k as f64,
-                points: Vec::new(),
-            });
+        let mut keyframes = reckoned(&truth, SIGMA, &mut random, |_, _| Vec::new());
+        for (keyframe, stamp_ns) in keyframes.iter_mut().zip(&stamps) {
+            keyframe.stamp_ns = *stamp_ns;
         }
         Self {
             stamps,
             truth,
-            keyframes: keyframes_,
+            keyframes,
         }
     }
 

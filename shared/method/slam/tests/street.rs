@@ -11,6 +11,8 @@ use gyre_slam::{
 };
 use nalgebra::{Matrix3, Point2};
 
+use crate::common::assert_refused;
+
 const REACH_M: f64 = 90.0;
 const CAPACITY: usize = 2048;
 const PERIOD_NS: i64 = 250_000_000;
@@ -55,15 +57,10 @@ fn map(street: &[(Point2<f64>, f32)]) -> Map {
         .map(|k| pose(2.0 * f64::from(k), 0.0, 0.0))
         .collect();
     let keyframe = |(k, at): (usize, &Pose)| Keyframe {
-        seq: k as u64,
-        scan: k as u64,
         stamp_ns: k as i64 * PERIOD_NS,
-        pose: uncertain(*at),
         motion: uncertain(pose(2.0, 0.0, 0.0)),
-        noise: Matrix3::zeros(),
-        twist: Twist::default(),
         path_m: 2.0 * k as f64,
-        points: seen(street, at),
+        ..Keyframe::standing(k as u64, uncertain(*at), seen(street, at))
     };
     Map::new(poses.iter().enumerate().map(keyframe).collect()).unwrap()
 }
@@ -216,16 +213,9 @@ fn a_map_that_was_not_written_to_its_end_is_refused_with_what_to_do() {
     let mut log = RecordLog::<Keyframe>::open_file(&folder.path().join("keyframes.log")).unwrap();
     log.cut(100).unwrap();
     drop(log);
-    let refused = |folder: &std::path::Path| Map::open(folder).err().unwrap().to_string();
-    assert_eq!(
-        refused(folder.path()),
-        "keyframes.log has 100 keyframes and no end, and places.index 151: draw the map again with gyre map"
-    );
-    let none = Map::new(Vec::new()).err().map(|error| error.to_string());
-    assert_eq!(
-        none.as_deref(),
-        Some("a map needs keyframes: there is none")
-    );
-    let nowhere = refused(&folder.path().join("nowhere"));
-    assert!(nowhere.contains("places.index"), "{nowhere}");
+    let words = "keyframes.log has 100 keyframes and no end, and places.index 151: draw the map \
+        again with gyre map";
+    assert_refused(Map::open(folder.path()), words);
+    assert_refused(Map::new(Vec::new()), "a map needs keyframes: there is none");
+    assert_refused(Map::open(&folder.path().join("nowhere")), "places.index");
 }

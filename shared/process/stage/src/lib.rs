@@ -16,7 +16,6 @@
 pub mod counters;
 pub mod datagrams;
 pub mod follower;
-mod gnss_receiver;
 pub mod inputs;
 pub mod launch;
 pub mod python_function;
@@ -28,7 +27,6 @@ pub mod stage;
 
 pub use counters::CountingAllocator;
 pub use follower::Follower;
-pub use gnss_receiver::GnssReceiver;
 pub use gyre_transport::RunError;
 pub use launch::Launch;
 pub use sink::Sink;

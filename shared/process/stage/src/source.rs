@@ -2,6 +2,7 @@
 //! when it is due.
 
 mod feed;
+mod fixes;
 mod live_samples;
 mod pace;
 mod playback;
@@ -22,6 +23,7 @@ use rustix::thread::set_current_timer_slack;
 use crate::Launch;
 pub use feed::Credit;
 pub(crate) use feed::{Feed, hop};
+pub use fixes::fixes_sent;
 use gyre_contract::run::StageCounters;
 use gyre_transport::RunError;
 use pace::Pace;

@@ -177,10 +177,7 @@ mod tests {
     }
 
     fn timed(stamps_ns: &[i64], poses: &[Pose]) -> Trajectory {
-        Trajectory {
-            stamp_ns: Some(stamps_ns.to_vec()),
-            poses: poses.to_vec(),
-        }
+        Trajectory::timed(stamps_ns.to_vec(), poses.to_vec())
     }
 
     fn seconds(s: &[f64]) -> Vec<i64> {

@@ -192,10 +192,8 @@ mod tests {
         truth_ms: &[i64],
     ) -> Result<MatchedMotions, EvaluationError> {
         let at = |&t: &i64| pose(t as f64, 0.0, 0.0);
-        let truth = Trajectory {
-            stamp_ns: Some(truth_ms.iter().map(|t| t * MS).collect()),
-            poses: truth_ms.iter().map(at).collect(),
-        };
+        let stamps = truth_ms.iter().map(|t| t * MS).collect();
+        let truth = Trajectory::timed(stamps, truth_ms.iter().map(at).collect());
         MatchedMotions::new(motions, &truth, 20 * MS)
     }
 

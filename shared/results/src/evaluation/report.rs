@@ -100,10 +100,7 @@ mod tests {
     use gyre_geometry::pose;
 
     fn evaluated(estimate: &[Pose], truth: &[Pose]) -> Evaluation {
-        let [estimate, truth] = [estimate, truth].map(|poses| Trajectory {
-            stamp_ns: None,
-            poses: poses.to_vec(),
-        });
+        let [estimate, truth] = [estimate, truth].map(|poses| Trajectory::untimed(poses.to_vec()));
         evaluate(&estimate, &truth, STEP).unwrap()
     }
 

@@ -98,10 +98,7 @@ mod tests {
 
     fn poses() -> Vec<PoseHeader> {
         let pose = |k: i64| PoseHeader {
-            item: Item {
-                stamp_ns: 1_549_986_608_000_000_007 + 250_000_000 * k,
-                ..Item::default()
-            },
+            item: Item::recorded(0, 0, 1_549_986_608_000_000_007 + 250_000_000 * k),
             motion: MotionEstimate {
                 x_m: 1.5,
                 y_m: -0.25,

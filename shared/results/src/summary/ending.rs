@@ -216,7 +216,7 @@ look at     gyre report out/radiate --open; all figures:
             let mut gyro = SensorCount {
                 motions: 400,
                 doubted,
-                delay_s: Some([delay_s, 0.03]),
+                delay_and_scale: Some([[delay_s, 0.03], [scale, 0.004]]),
                 ..SensorCount::default()
             };
             gyro.last.scale = scale;
@@ -250,7 +250,7 @@ look at     gyre report out/radiate --open; all figures:
         assert!(problem(94, 0, 0, 1.0, 0.0).contains(HARDLY_MEASURED));
         assert!(problem(0, 41, 0, 1.0, 0.0).contains("41 of its 400 turns"));
         assert!(problem(0, 0, 201, 1.0, 0.0).contains("201 of their 400"));
-        assert!(problem(0, 0, 0, 1.05, 0.0).contains("`gyro.scale` or"));
+        assert!(problem(0, 0, 0, 1.05, 0.0).contains("set gyro.scale=1.050"));
         assert!(problem(0, 0, 0, 1.0, -0.3).contains("set gyro.delay_s=-0.30"));
         assert!(problem(0, 0, 0, 0.0, 0.0).contains("gyro.kind is set, but none of the 465"));
     }

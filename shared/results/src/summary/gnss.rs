@@ -102,7 +102,7 @@ mod tests {
     use std::path::Path;
 
     use gyre_geometry::{
-        Twist, pose,
+        pose,
         samples::{GnssConfig, GnssFix, SampleKind},
     };
     use gyre_slam::{EstimatorKind, Fixes, Keyframe};
@@ -116,15 +116,10 @@ mod tests {
             covariance: 0.01 * Matrix3::identity(),
         };
         Keyframe {
-            seq: k,
-            scan: k,
             stamp_ns: 250_000_000 * k as i64,
-            pose: along(2.0 * k as f64),
             motion: along(2.0),
-            noise: Matrix3::zeros(),
-            twist: Twist::default(),
             path_m: 2.0 * k as f64,
-            points: Vec::new(),
+            ..Keyframe::standing(k, along(2.0 * k as f64), Vec::new())
         }
     }
 

@@ -2,11 +2,12 @@
 
 use std::collections::VecDeque;
 
-use gyre_calibration::{Compared, delay};
+use gyre_calibration::{Compared, compare};
 use gyre_configuration::Configuration;
 use gyre_contract::{
     Measures, PoseHeader, Witness, WitnessRecord, flag, initial_guess, outcome, verdict,
 };
+use gyre_geometry::samples::SensorConfig;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{Counts, GnssSummary};
@@ -16,9 +17,9 @@ use super::{Counts, GnssSummary};
 const MAX_DOUBTED_SHARE: f64 = 0.1;
 const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
-/// A delay of more than so many standard deviations is one.
-const DELAY_SIGMAS: f64 = 4.0;
-/// The delay is measured over so many motions: an hour.
+/// A delay or a scale that is off by more than so many standard deviations is wrong.
+const SIGMAS: f64 = 4.0;
+/// Delay and scale are measured over so many motions: an hour.
 const MOTIONS_OF_DELAY: usize = 1 << 14;
 
 /// The part of a kind of sensor in the motions of a run.
@@ -35,8 +36,9 @@ pub struct SensorCount {
     pub predicted: u64,
     /// Scale and bias after the last of these motions.
     pub last: WitnessRecord,
-    /// Delay of its stamps and its standard deviation, s; `None`: it is unknown.
-    pub delay_s: Option<[f64; 2]>,
+    /// The delay of its stamps, s, and its scale against the radar over the whole run, each with its
+    /// standard deviation; `None`: they are unknown.
+    pub delay_and_scale: Option<[[f64; 2]; 2]>,
 }
 
 /// Of each kind; `None`: it has measured nothing.
@@ -87,7 +89,7 @@ impl Serialize for Named<'_> {
             }
         }
         if row.samples.is_some() {
-            map.serialize_entry("delay_s", &count.delay_s)?;
+            map.serialize_entry("delay_s", &count.delay_and_scale.map(|it| it[0]))?;
         }
         map.end()
     }
@@ -101,16 +103,13 @@ pub struct SensorCounter {
 
 impl SensorCounter {
     pub fn add(&mut self, pose: &PoseHeader) {
-        let (motion, record) = (&pose.motion, &pose.motion.refinement);
+        let record = &pose.motion.refinement;
         for (kind, _) in Witness::sampled() {
-            let by_radar = match kind.row().measures {
-                // A registered turn depends on the gyro.
-                Measures::Turn => motion.searched[2],
-                Measures::Distance => motion.x_m,
-                // A heading, whose offset is unknown, is no motion.
-                Measures::Heading => continue,
-            };
-            self.clocks[kind as usize].add(pose, by_radar, record.of(kind).measured());
+            // A heading, whose offset is unknown, is no motion.
+            if kind.row().measures != Measures::Heading {
+                let of = record.of(kind);
+                self.clocks[kind as usize].add(pose, of.registered, of.measured());
+            }
         }
         let is_predicted = record.outcome == outcome::PREDICTED;
         for kind in Witness::ALL {
@@ -130,9 +129,11 @@ impl SensorCounter {
         let mut clocks = self.clocks.into_iter();
         let all = Witness::ALL.map(|kind| {
             let has_bias = kind.row().measures == Measures::Turn;
-            let delay_s = clocks.next().and_then(|clock| clock.delay_s(has_bias));
+            let delay_and_scale = clocks
+                .next()
+                .and_then(|clock| clock.delay_and_scale(has_bias));
             let count = SensorCount {
-                delay_s,
+                delay_and_scale,
                 ..self.counts[kind as usize]
             };
             (count.motions > 0).then_some(count)
@@ -141,7 +142,7 @@ impl SensorCounter {
     }
 }
 
-/// The motions by the radar alone and by a sensor, to measure the delay between them.
+/// The motions by the radar alone and by a sensor, to measure the delay and the scale between them.
 #[derive(Debug, Default)]
 pub struct Clock(VecDeque<Compared>);
 
@@ -165,10 +166,11 @@ impl Clock {
         });
     }
 
-    /// Returns the delay and its standard deviation, s; `None` where it is not determined.
-    pub fn delay_s(mut self, has_bias: bool) -> Option<[f64; 2]> {
-        let delay = delay(self.0.make_contiguous(), has_bias)?;
-        Some([delay.value, delay.sigma])
+    /// Returns the delay, s, and the scale, each with its standard deviation; `None` where they are
+    /// not determined.
+    pub fn delay_and_scale(mut self, has_bias: bool) -> Option<[[f64; 2]; 2]> {
+        let both = compare(self.0.make_contiguous(), has_bias)?;
+        Some(both.map(|estimate| [estimate.value, estimate.sigma]))
     }
 }
 
@@ -203,7 +205,7 @@ pub fn problem(
             Measures::Heading => too_many(contradictions, it.motions, MAX_DOUBTED_SHARE),
         };
         let section = kind.name();
-        let cause = cause(kind, sensors.of(kind)?.delay_s(), it.delay_s, is_wrong)?;
+        let cause = cause(kind, sensors.of(kind)?, it, is_wrong)?;
         let motions = it.motions;
         Some(match kind.row().measures {
             Measures::Turn => format!(
@@ -224,17 +226,31 @@ pub fn problem(
     sampled().find_map(contradicted).or_else(by_gnss)
 }
 
-/// Returns which key of a sensor is wrong: by a delay, if that is certain.
-fn cause(kind: Witness, set_s: f64, measured: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
+/// Returns which key of a sensor is wrong: the delay or the scale, if one of them is certain.
+fn cause(
+    kind: Witness,
+    config: &dyn SensorConfig,
+    it: &SensorCount,
+    is_wrong: bool,
+) -> Option<String> {
     let section = kind.name();
     let up = match kind.row().measures {
         Measures::Turn => "`gyro.up`, ",
         Measures::Distance | Measures::Heading => "",
     };
-    match measured {
-        Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
+    let (set_scale, max_error) = config.scale();
+    let is_late = |[delay_s, sigma_s]: &[f64; 2]| delay_s.abs() > SIGMAS * sigma_s;
+    let is_scaled =
+        |[scale, sigma]: &[f64; 2]| (scale - 1.0).abs() > max_error.hypot(SIGMAS * sigma);
+    let [delay, scale] = it.delay_and_scale.map_or([None; 2], |it| it.map(Some));
+    match (delay.filter(is_late), scale.filter(is_scaled)) {
+        (Some([delay_s, sigma_s]), _) => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.delay_s={:.2}, which `gyre calibrate` finds too",
-            set_s + delay_s
+            config.delay_s() + delay_s
+        )),
+        (None, Some([scale, sigma])) => Some(format!(
+            "the true values are {scale:.3} \u{b1} {sigma:.3} times the measured ones: set {section}.scale={:.3}, which `gyre calibrate` finds too",
+            set_scale * scale
         )),
         _ if is_wrong && kind.row().measures == Measures::Heading => Some(format!(
             "it turns the other way, is of another drive, or `{section}.delay_s` or `{section}.noise_deg` is wrong"
@@ -271,6 +287,7 @@ mod tests {
                     scale_sigma: 0.25,
                     bias: 0.5,
                     bias_sigma: 0.125,
+                    ..WitnessRecord::default()
                 };
             }
             counter.add(&pose);

@@ -9,10 +9,7 @@ use gyre_results::evaluation::{Evaluation, evaluate};
 use proptest::prelude::*;
 
 pub fn by_index(estimate: &[Pose], truth: &[Pose], step: usize) -> Evaluation {
-    let [estimate, truth] = [estimate, truth].map(|poses| Trajectory {
-        stamp_ns: None,
-        poses: poses.to_vec(),
-    });
+    let [estimate, truth] = [estimate, truth].map(|poses| Trajectory::untimed(poses.to_vec()));
     evaluate(&estimate, &truth, NonZeroUsize::new(step).unwrap()).unwrap()
 }
 

@@ -2,6 +2,7 @@
 
 use gyre_client::{RunError, clock};
 use gyre_colossus::Azimuth;
+use gyre_contract::GnssHeader;
 use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{
     Definition, Ros2Message,
@@ -9,11 +10,11 @@ use gyre_ros2_messages::{
     nav_msgs::Odometry,
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     radar::DescribedRadar,
-    sensor_msgs::Imu,
+    sensor_msgs::{Imu, NavSatFix},
 };
 use ros2_client::{Gid, ReadError, Subscription};
 
-use super::{Settings, fixes::Fixes, wakeups::Wakeups};
+use super::{Settings, wakeups::Wakeups};
 use crate::node::Node;
 
 const NODE: &str = "gyre_source";
@@ -21,6 +22,8 @@ const NODE: &str = "gyre_source";
 const AZIMUTHS: usize = 4_000;
 /// Samples of a gyro that are kept: ten seconds of 400 a second.
 const SAMPLES: usize = 4_000;
+/// Fixes that are kept: ten seconds of 20 a second.
+const FIXES: usize = 200;
 const TURNS: usize = 10;
 
 fn names() -> [String; 3] {
@@ -93,7 +96,7 @@ pub struct Driver {
     /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
     pub sample_wakeups: Wakeups,
     samples: Vec<(SampleKind, TakeSample)>,
-    pub fixes: Option<Fixes>,
+    fixes: Option<Subscription<NavSatFix>>,
 }
 
 impl Driver {
@@ -105,8 +108,7 @@ impl Driver {
         let (mut samples, mut fixes) = (Vec::new(), None);
         for (kind, topic) in &settings.sensors {
             if *kind == SampleKind::Gnss {
-                let to = &settings.fixes_to;
-                fixes = Some(Fixes::open(&mut node, &mut wakeups, topic, to)?);
+                fixes = Some(wakeups.subscribe(&mut node, topic, FIXES, true)?);
             }
             let sampled = SAMPLED.iter().find(|(of, _)| of == kind);
             if let Some((_, subscribe)) = sampled {
@@ -186,6 +188,19 @@ impl Driver {
     pub fn sample(&self, of: SampleKind) -> Option<Sample> {
         let (_, take) = self.samples.iter().find(|(kind, _)| *kind == of)?;
         take()
+    }
+
+    /// Takes the next message of a GNSS receiver.
+    pub fn fix(&self) -> Option<GnssHeader> {
+        let received_ns = clock::since_1970_ns();
+        match self.fixes.as_ref()?.take() {
+            Ok(taken) => {
+                let (message, _) = taken?;
+                let stamp_ns = message.header.stamp_or(received_ns);
+                Some(GnssHeader::of(stamp_ns, message.fix(received_ns)))
+            }
+            Err(_) => Some(GnssHeader::counts(1, 0)),
+        }
     }
 
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {

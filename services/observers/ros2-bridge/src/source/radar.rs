@@ -7,7 +7,7 @@ use std::{
 };
 
 use gyre_client::{RunError, clock};
-use gyre_contract::{ScanHeader, StageId, control::Received};
+use gyre_contract::{GnssHeader, ScanHeader, StageId, control::Received};
 use gyre_geometry::samples::{Sample, SampleKind};
 use gyre_ros2_messages::{navtech_msgs::RadarBScanMsg, radar::DescribedRadar};
 use gyre_stage::source::{Arrival, Sensor};
@@ -222,9 +222,6 @@ impl Sensor for Radar {
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, RunError> {
         let is_received = self.driver.receive()?;
         self.driver.wakeups.clear()?;
-        if let Some(fixes) = &mut self.driver.fixes {
-            fixes.pass_on();
-        }
         self.take_configuration(bytes.len())?;
         if let Some((turn, rows)) = self.turn.take()
             && self.add_turn(turn, rows, header, bytes)
@@ -256,6 +253,10 @@ impl Sensor for Radar {
     fn sample(&mut self, of: SampleKind) -> Option<Sample> {
         self.driver.sample_wakeups.clear().ok()?;
         self.driver.sample(of)
+    }
+
+    fn fix(&mut self) -> Option<GnssHeader> {
+        self.driver.fix()
     }
 
     fn due_ns(&self) -> Option<i64> {

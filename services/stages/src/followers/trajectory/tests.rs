@@ -1,7 +1,16 @@
 use std::{f64::consts::TAU, iter::successors};
 
-use gyre_geometry::{Pose, Twist, UncertainMotion, pose, samples::GnssFix};
+use gyre_contract::{Gnss, GnssHeader};
+use gyre_geometry::{
+    Pose, UncertainMotion, pose,
+    samples::{GnssFix, Sample},
+};
+use gyre_recording::received_fixes;
 use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
+use gyre_transport::{
+    numbers::Numbers,
+    rig::{self, Run},
+};
 use nalgebra::{Matrix3, Vector3};
 
 use super::*;
@@ -18,16 +27,13 @@ fn keyframe(index: usize) -> Keyframe {
     let motion = uncertain(3.0, 0.0, TAU / 40.0 - 0.0005);
     let poses = successors(Some(pose(0.0, 0.0, 0.0)), |at| Some(at * motion.motion));
     let [x_m, y_m, yaw_rad] = poses.skip(index).map(|at| xy_yaw(&at)).next().unwrap();
+    let pose = uncertain(x_m, y_m, yaw_rad);
     Keyframe {
-        seq: 2 * index as u64,
         scan: 5 * index as u64,
         stamp_ns: 7 * index as i64,
-        pose: uncertain(x_m, y_m, yaw_rad),
         motion,
-        noise: Matrix3::zeros(),
-        twist: Twist::default(),
         path_m: 3.0 * index as f64,
-        points: Vec::new(),
+        ..Keyframe::standing(2 * index as u64, pose, Vec::new())
     }
 }
 
@@ -188,20 +194,50 @@ fn fixes_correct_as_keyframes_come_and_the_last_correction_is_that_of_the_result
 }
 
 #[test]
-fn an_idle_step_takes_the_fixes_that_have_arrived() {
-    let logs = Logs::new();
-    let mut trajectory = logs.trajectory();
-    // The system gives such a port to no socket.
-    let listen = format!("127.0.0.3:{}", 20_000 + std::process::id() % 10_000);
-    let config = GnssConfig {
-        listen: listen.clone(),
-        ..GnssConfig::default()
+fn messages_are_logged_once_whoever_is_restarted_and_the_missing_ones_are_counted() {
+    let run = Run::begin();
+    let manifest = &run.manifest;
+    let log = received_fixes(&manifest.out);
+    std::fs::create_dir(log.parent().unwrap()).unwrap();
+    let sender = rig::writer::<Gnss>(manifest);
+    let send = |seq, mut message: GnssHeader| {
+        message.item.seq = seq;
+        sender.publish(message, None).unwrap();
     };
-    let live = LiveFixes::open(config, logs.out.path()).unwrap();
-    trajectory.live_fixes = Some(live);
-    let receiver = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    receiver.send_to(b"1,2,3", &listen).unwrap();
+    let fix = |seq| {
+        let fix = Sample::fix(seq as i64, [2.0, 3.0], 0.0, 0.5);
+        send(seq, GnssHeader::of(seq as i64, Some(fix)));
+    };
+    let node = rig::node(manifest);
+    let open = || LiveFixes::open(GnssConfig::default(), &node, manifest).unwrap();
+    assert!(!LiveFixes::have_begun(manifest));
+    let mut killed = open();
+    [0, 1].into_iter().for_each(fix);
+    killed.take().unwrap();
+    drop(killed);
+    // It was killed within a row.
+    let text = std::fs::read_to_string(&log).unwrap();
+    std::fs::write(&log, format!("{text}2,2,")).unwrap();
+    fix(2);
+    let mut restarted = open();
+    send(3, GnssHeader::of(17, None));
+    send(5, GnssHeader::counts(2, 3));
+    let mut logs = Logs::new();
+    logs.append(1, 0);
+    let mut trajectory = logs.trajectory();
+    restarted.take().unwrap();
+    trajectory.live_fixes = Some(restarted);
+    fix(6);
     follow(&mut trajectory);
-    let log = std::fs::read_to_string(received_fixes(logs.out.path())).unwrap();
-    assert!(log.ends_with("\n1,2,3,0\n"), "{log}");
+    // The source has died before it has sent the eighth.
+    let mut sent = Numbers::open(manifest, "source.fixes").unwrap();
+    sent.write([8]).unwrap();
+    trajectory.sync().unwrap();
+    let text = std::fs::read_to_string(&log).unwrap();
+    let rows = "0,2,3,0,0.5\n1,2,3,0,0.5\n\n2,2,3,0,0.5\n17,,,,0\nunreadable,2\nlost,4\n\
+                6,2,3,0,0.5\nlost,1\n";
+    assert_eq!(text.split_once('\n').unwrap().1, rows);
+    let faults = gyre_datasets::SampleLog::received(&log).faults;
+    let counts = (faults.lost, faults.unreadable, faults.without_fix);
+    assert_eq!(counts, (5, 2, 1));
 }

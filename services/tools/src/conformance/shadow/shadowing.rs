@@ -1,23 +1,26 @@
 //! The loop: takes the items of the run, starts the shadow, sends it item after item, and compares
 //! its answers.
 
-mod answers;
-
 use std::{
     collections::VecDeque,
+    fmt::Display,
     time::{Duration, Instant},
 };
 
 use gyre_client::{Listener, MAX_WAIT, Run, RunError, Signals, clock};
-use gyre_configuration::terminal::Failure;
-use gyre_contract::StageId;
+use gyre_configuration::terminal::{Failure, print};
+use gyre_contract::{Item, StageId, flag};
+use gyre_supervise::rig::Recorded;
 
 use super::{
-    Options,
-    life::{Life, ShadowProgram},
+    Life, ShadowArguments, ShadowProgram,
     observation::{Observation, Observed},
     record::{Record, keep},
     renumbering::{Entry, Renumbering, SentItem},
+};
+use crate::conformance::{
+    harness::Sent,
+    result::{not_copied, wrong_stamps},
 };
 
 /// Items that wait for the shadow at most; then all but the newest are skipped.
@@ -34,7 +37,7 @@ const BACKOFF: Duration = Duration::from_secs(1);
 const MAX_FAILURES: u64 = 3;
 
 pub(crate) struct Shadowing<'a> {
-    options: &'a Options,
+    arguments: &'a ShadowArguments,
     program: &'a ShadowProgram,
     signals: &'a Signals,
     topic: &'static str,
@@ -51,7 +54,6 @@ pub(crate) struct Shadowing<'a> {
     /// Ends since the last compared item.
     failures: u64,
     record: Record,
-    lines: Vec<String>,
 }
 
 struct UnderWay {
@@ -63,47 +65,53 @@ struct UnderWay {
     is_timed: bool,
 }
 
+fn say(line: impl Display) {
+    print::note(format_args!("gyre shadow: {line}"));
+}
+
 impl<'a> Shadowing<'a> {
     pub(crate) fn begin(
-        options: &'a Options,
+        arguments: &'a ShadowArguments,
         program: &'a ShadowProgram,
         run: &'a Run,
         signals: &'a Signals,
         record: Record,
     ) -> Result<Self, RunError> {
         let now = Instant::now();
-        let candidate = &program.candidate;
-        let (topics, out) = (candidate.topics(), candidate.manifest.out.display());
-        let (command, stage) = (candidate.command.join(" "), options.stage.name());
+        let (stage, topics) = (program.candidate.stage, program.candidate.topics());
         Ok(Self {
-            options,
+            arguments,
             program,
             signals,
             topic: topics.output,
-            observation: Observation::of(run, options.stage, &topics)?,
+            observation: Observation::of(run, stage, &topics)?,
             taken: now,
             backlog: VecDeque::new(),
             life: None,
-            renumbering: Renumbering::new(options.stage, run.manifest().window.lag),
+            renumbering: Renumbering::new(stage, run.manifest().window.lag),
             under_way: None,
             unanswerable: None,
             due: now,
             failures: 0,
             record,
-            lines: vec![format!("`{command}` beside {stage} of {out}")],
         })
     }
 
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
-    pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, Failure> {
+    pub(crate) fn run(mut self) -> Result<Record, Failure> {
         let began = Instant::now();
+        let program = &self.program.candidate;
+        let (command, out) = (program.command.join(" "), program.manifest.out.display());
+        let stage = program.stage.name();
+        let mut begins = Some(format!("`{command}` beside {stage} of {out}"));
         loop {
             // Before the poll: the messages before the end are still in the queues.
             let has_ended = self.observation.has_ended();
             self.take(has_ended)?;
             self.attend()?;
-            self.lines.drain(..).for_each(|line| observe(&line));
-            let (limit, scans) = (self.options.duration, self.options.scans);
+            // A program that cannot be started is reported by the error alone.
+            begins.take().into_iter().for_each(say);
+            let (limit, scans) = (self.arguments.duration, self.arguments.scans);
             let is_over = limit.is_some_and(|limit| began.elapsed() >= limit);
             let has_enough = scans.is_some_and(|scans| self.record.counts.compared >= scans);
             if is_over || has_enough || self.is_done(has_ended) || self.sleep()? {
@@ -149,7 +157,8 @@ impl<'a> Shadowing<'a> {
     }
 
     fn bound_backlog(&mut self) -> Result<(), RunError> {
-        let starts_again = self.options.stage == StageId::Refinement && self.life.is_some();
+        let starts_again =
+            self.program.candidate.stage == StageId::Refinement && self.life.is_some();
         let limit = match starts_again {
             true => BACKLOG_OF_REFINEMENT,
             false => BACKLOG,
@@ -199,13 +208,13 @@ impl<'a> Shadowing<'a> {
 
     fn start(&mut self) -> Result<(), Failure> {
         // A refinement begins with a copy of the state after its first item, which has to be there.
-        let waits = self.options.stage == StageId::Refinement && self.backlog.is_empty();
+        let waits = self.program.candidate.stage == StageId::Refinement && self.backlog.is_empty();
         if waits || Instant::now() < self.due {
             return Ok(());
         }
         self.record.counts.starts += 1;
         self.renumbering = Renumbering::new(
-            self.options.stage,
+            self.program.candidate.stage,
             self.program.candidate.manifest.window.lag,
         );
         self.life = Some(Life::begin(self.program, self.signals)?);
@@ -214,7 +223,7 @@ impl<'a> Shadowing<'a> {
 
     fn hangs(&self) -> Option<String> {
         let life = self.life.as_ref()?;
-        let (start, item_timeout) = (self.options.start_timeout, self.options.item_timeout);
+        let (start, item_timeout) = (self.arguments.start_timeout_s, self.arguments.patience_s);
         if !life.is_open {
             let topic = self.topic;
             return (life.began.elapsed() > start)
@@ -232,7 +241,7 @@ impl<'a> Shadowing<'a> {
             true => "it is not started again",
             false => "it is started again",
         };
-        self.lines.push(format!("{sentence}; {again}"));
+        say(format_args!("{sentence}; {again}"));
         keep(&mut self.record.ends, sentence);
         self.end_life(BACKOFF)
     }
@@ -293,5 +302,72 @@ impl<'a> Shadowing<'a> {
             self.program.keep_output(&life)?;
         }
         Ok(self.record)
+    }
+
+    fn receive(&mut self, sent: Sent) -> Result<(), Failure> {
+        let output = match sent {
+            Sent::Message(output) => output,
+            Sent::Malformed { sentence, .. } => {
+                self.breach(sentence);
+                self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
+                return Ok(());
+            }
+        };
+        let item = output.item();
+        match self.under_way.take() {
+            Some(it) if it.sent.item.seq == item.seq && !item.is(flag::END) => {
+                self.unanswerable = None;
+                return self.answered(&it, &output);
+            }
+            before => self.under_way = before,
+        }
+        match self.unanswerable.take() {
+            Some(seq) if seq == item.seq && !item.is(flag::END) => {}
+            unasked => {
+                self.unanswerable = unasked;
+                let owed = match &self.under_way {
+                    Some(it) => format!("item {}", it.sent.item.seq),
+                    None => "none".to_owned(),
+                };
+                let seq = item.seq;
+                self.breach(format!("it sent item {seq}, and {owed} was to be answered"));
+            }
+        }
+        Ok(())
+    }
+
+    fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), Failure> {
+        let stage = self.program.candidate.stage;
+        let (item, sent) = (output.item(), &it.sent.item);
+        for field in not_copied(stage, sent, &item) {
+            let seq = it.observed.seq();
+            self.breach(format!("item {seq}: {field} is not that of its input"));
+        }
+        let wrong = wrong_stamps(stage, &item, Some(it.sent_ns), output.received_ns);
+        let has_stamps = wrong.is_none();
+        wrong.into_iter().for_each(|sentence| self.breach(sentence));
+        if it.sent.opens {
+            self.record.counts.opening += 1;
+            return Ok(());
+        }
+        self.failures = 0;
+        let answered_ns = match has_stamps {
+            true => item.hops[stage as usize].published_ns,
+            false => output.received_ns,
+        };
+        let as_observed = Item {
+            seq: it.observed.seq(),
+            ..item
+        };
+        let answer_ns = it.is_timed.then_some(answered_ns - it.sent_ns);
+        let shadow = output.about(&as_observed);
+        self.record.compare(&it.observed.output, &shadow, answer_ns)
+    }
+
+    fn breach(&mut self, sentence: String) {
+        if self.record.counts.breaches == 0 {
+            say(format_args!("it breaks the contract: {sentence}"));
+        }
+        self.record.breach(sentence);
     }
 }

@@ -13,7 +13,7 @@ use ratatui::{
     widgets::{Block, Paragraph, Sparkline},
 };
 
-use super::snapshot::{Snapshot, Use};
+use super::{Snapshot, Use};
 use crate::operate::processes::{duration, lacks, summary};
 
 const COLUMNS: [(&str, u16); 12] = [

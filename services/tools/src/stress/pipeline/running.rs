@@ -4,25 +4,19 @@ use std::{
     fs::{self, File},
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
-    process::Child,
+    process::{self, Child, Command, Stdio},
     thread,
     time::{Duration, Instant},
 };
 
 use gyre_client::{Observer, Run, RunError, last_line, run::sweep};
-use gyre_configuration::terminal::Failure;
+use gyre_configuration::terminal::{Failure, own};
 use gyre_contract::{Pose, PoseHeader, run::Scenario};
 use gyre_storage::create_folder;
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::{Setup, TICK, drain};
-use crate::{
-    operate::status_of,
-    stress::{
-        TestedPipeline,
-        helper::{Work, spawn},
-    },
-};
+use crate::{operate::status_of, stress::TestedPipeline};
 
 /// Poses before the measurement: buffers grow, and memory is touched for the first time.
 const WARM_UP: u64 = 8;
@@ -52,10 +46,15 @@ impl<'a> Running<'a> {
         let errors = output.try_clone().map_err(RunError::file(&log))?;
         // Removes the leftovers of an earlier killed run.
         sweep();
-        let work = Work::Run(words(tested, setup, &out));
+        let run = Command::new(own())
+            .args(words(tested, setup, &out))
+            .stdin(Stdio::null())
+            .stdout(output)
+            .stderr(errors)
+            .spawn();
         Ok(Self {
             setup,
-            process: spawn(&work, output.into(), errors.into())?,
+            process: run.map_err(|error| format!("cannot start a run: {error}"))?,
             out,
             log,
             deadline: Instant::now() + START_LIMIT,
@@ -165,7 +164,8 @@ fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
     let set = set.iter().chain(&setup.set);
     let named = [
         "run".to_owned(),
-        tested.configuration.display().to_string(),
+        format!("--parent={}", process::id()),
+        tested.out.join("config.toml").display().to_string(),
         "--fresh".to_owned(),
         format!("--out={}", out.display()),
         format!("--rate={rate}"),
@@ -176,8 +176,6 @@ fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::process::Command;
-
     use super::*;
 
     #[test]

@@ -8,15 +8,7 @@ const ENCODER: u16 = 5600;
 const BINS: u16 = 3000;
 
 fn radar() -> Configuration {
-    Configuration {
-        azimuth_samples: 400,
-        bin_size: 438,
-        range_in_bins: BINS,
-        encoder_size: ENCODER,
-        rotation_mhz: 4000,
-        range_resolution_m: Some(0.04381),
-        ..Configuration::default()
-    }
+    Configuration::usual(400, BINS)
 }
 
 /// The datagrams of an azimuth whose powers begin with its row.
@@ -28,14 +20,7 @@ fn datagrams(row: u16, number: &mut u32, bins: u16) -> Vec<Vec<u8>> {
         ..ClockFormat::default()
     };
     let stamp_ns = 1_700_000_000_000_000_000 + i64::from(row) * 625_000;
-    let (seconds, split_seconds) = format.fields(stamp_ns);
-    let azimuth = Azimuth {
-        sweep_counter: 0,
-        encoder: row * 14,
-        seconds,
-        split_seconds,
-        powers: Powers::Eight(&powers),
-    };
+    let azimuth = Azimuth::at(row * 14, stamp_ns, format, &powers);
     let mut sent = Vec::new();
     let mut send = |bytes: &[u8]| sent.push(bytes.to_vec());
     write_azimuth(&radar(), &azimuth, number, &mut send);

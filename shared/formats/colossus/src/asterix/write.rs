@@ -1,6 +1,7 @@
 //! Azimuths as datagrams, as a radar sends them.
 
 use super::{ANGLES, BLOCK_BYTES, CATEGORY, FEMTO, HALF_C_MPS, SPECIAL_BYTES, VIDEO};
+use crate::clock::ClockFormat;
 use crate::configuration::Configuration;
 use crate::message::{Azimuth, Powers};
 
@@ -50,13 +51,7 @@ pub fn write_azimuth(
 
 /// Appends a message that describes the radar and has no powers.
 pub fn write_description(out: &mut Vec<u8>, radar: &Configuration, number: u32) {
-    let azimuth = Azimuth {
-        sweep_counter: 0,
-        encoder: 0,
-        seconds: [0; 4],
-        split_seconds: [0; 4],
-        powers: Powers::Eight(&[]),
-    };
+    let azimuth = Azimuth::at(0, 0, ClockFormat::default(), &[]);
     write(out, radar, &azimuth, number, (0, 1, &[]));
 }
 

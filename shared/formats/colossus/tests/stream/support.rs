@@ -1,8 +1,7 @@
 //! A radar that turns.
 
 use gyre_colossus::{
-    Azimuth, ClockFormat, Configuration, Counters, Event, Parser, Powers, RadarClock, Sweep,
-    SweepAssembler,
+    Azimuth, ClockFormat, Configuration, Counters, Event, Parser, RadarClock, Sweep, SweepAssembler,
 };
 use gyre_datasets::DatasetOptions;
 use gyre_geometry::OwnedScan;
@@ -13,15 +12,8 @@ pub const START_NS: i64 = 1_547_131_046_353_776_001;
 /// A small radar with the encoder of Oxford's or FoMo's.
 pub fn configuration(encoder_size: u16, bins: u16) -> Configuration {
     Configuration {
-        azimuth_samples: 400,
-        bin_size: 438,
-        range_in_bins: bins,
         encoder_size,
-        rotation_mhz: 4000,
-        packet_rate: 1600,
-        range_gain: 1.0,
-        range_offset: 0.0,
-        range_resolution_m: Some(0.04381),
+        ..Configuration::usual(400, bins)
     }
 }
 
@@ -35,14 +27,7 @@ pub struct SentAzimuth {
 
 impl SentAzimuth {
     pub fn azimuth(&self, format: ClockFormat) -> Azimuth<'_> {
-        let (seconds, split_seconds) = format.fields(self.stamp_ns);
-        Azimuth {
-            sweep_counter: 7,
-            encoder: self.encoder,
-            seconds,
-            split_seconds,
-            powers: Powers::Eight(&self.powers),
-        }
+        Azimuth::at(self.encoder, self.stamp_ns, format, &self.powers)
     }
 }
 

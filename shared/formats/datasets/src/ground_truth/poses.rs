@@ -7,7 +7,7 @@ use gyre_radar::trajectory::Trajectory;
 use gyre_storage::quoted;
 use nalgebra::{Complex, Matrix3, Translation2, Unit, UnitComplex, Vector3};
 
-use super::{LineError, lines, numbers, stamped, timed};
+use super::{LineError, lines, numbers, stamped};
 use crate::dataset::stamp;
 
 /// A row-major 3 x 4 pose of the sensor in the world. Its rotation may have any scale.
@@ -44,7 +44,7 @@ pub(super) fn tum(text: &str) -> Result<Trajectory, LineError> {
     // not exactly normalised.
     let projected = project(&matrices)?.into_iter();
     let poses = projected.map(|[x, y, cos, sin]| pose(x, y, sin.atan2(cos)));
-    Ok(timed((stamps, poses.collect())))
+    Ok(Trajectory::timed(stamps, poses.collect()))
 }
 
 /// Returns the matrix of a position and a quaternion; its rotation has the scale of the quaternion.
@@ -78,10 +78,8 @@ pub(super) fn kitti(text: &str) -> Result<Trajectory, LineError> {
         let leading = usize::from(row.split_whitespace().count() == 13);
         matrices.push(numbers::<12>(line, row.split_whitespace().skip(leading))?);
     }
-    Ok(Trajectory {
-        stamp_ns: None,
-        poses: project(&matrices)?.into_iter().map(planar).collect(),
-    })
+    let poses = project(&matrices)?.into_iter().map(planar);
+    Ok(Trajectory::untimed(poses.collect()))
 }
 
 /// Parses a file of Boreas. Its poses have roll and pitch: they are inverted in space, and
@@ -99,7 +97,7 @@ fn boreas_odometry(text: &str) -> Result<Trajectory, LineError> {
         true => poses.map(|pose| mirrored(&pose)).collect(),
         false => poses.collect(),
     };
-    Ok(timed((stamps, poses)))
+    Ok(Trajectory::timed(stamps, poses))
 }
 
 fn inverse(m: &Matrix) -> Matrix {

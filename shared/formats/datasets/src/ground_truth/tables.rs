@@ -4,7 +4,7 @@ use gyre_geometry::{Pose, mirrored, pose};
 use gyre_radar::trajectory::Trajectory;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{LineError, columns, lines, number, numbers, stamp_field, stamped, timed};
+use super::{LineError, columns, lines, number, numbers, stamp_field, stamped};
 
 /// The names of the column of times, in order of precedence.
 pub(super) const TIMES: [&str; 2] = ["GPSTime", "ROSTime"];
@@ -39,7 +39,7 @@ pub(super) fn oxford(text: &str) -> Result<Trajectory, LineError> {
         stamps.push(now_ns);
         poses.push(now);
     }
-    Ok(timed((stamps, poses)))
+    Ok(Trajectory::timed(stamps, poses))
 }
 
 fn motions(text: &str) -> Result<Vec<Motion>, LineError> {
@@ -90,7 +90,7 @@ pub(super) fn boreas(text: &str) -> Result<Trajectory, LineError> {
         let pose = pose(number(east)?, number(north)?, yaw);
         Ok((stamp_field(line, row, time)?, pose))
     })
-    .map(timed)
+    .map(|(stamps, poses)| Trajectory::timed(stamps, poses))
 }
 
 /// Returns the direction of the sensor's x axis in the east-north plane, counter-clockwise from
@@ -114,7 +114,7 @@ pub(super) fn mulran(text: &str) -> Result<Trajectory, LineError> {
         let matrix = numbers::<12>(line, row.split(',').skip(1))?;
         Ok((stamp, radar_pose(&matrix)))
     })
-    .map(timed)
+    .map(|(stamps, poses)| Trajectory::timed(stamps, poses))
 }
 
 fn radar_pose(m: &[f64; 12]) -> Pose {

@@ -9,6 +9,9 @@ pub struct LogFaults {
     pub unreadable: usize,
     /// Line (of a folder of files: number) of the first of them.
     pub first_unreadable: usize,
+    /// Messages of a live receiver of fixes that came faster than they were read, or died with a
+    /// process.
+    pub lost: usize,
     /// Messages of a bag, and rows with a stamp but no place: the receiver had no fix.
     pub without_fix: usize,
     /// Samples that are stated to have no value, or have one that is not finite.
@@ -79,6 +82,7 @@ pub(super) const OF_SAMPLES: &[FaultWords] = words! {
 
 pub(super) const OF_FIXES: &[FaultWords] = words! {
     unreadable: "unreadable",
+    lost: "lost",
     without_fix: "without a fix",
     not_a_number: "not a number",
     off_the_earth: "off the earth",

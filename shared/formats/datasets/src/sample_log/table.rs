@@ -14,8 +14,10 @@ use crate::header::Header;
 pub(crate) const MAX_BYTES: u64 = 4 << 30;
 /// Marks between columns that are looked for in the first row.
 const MARKS: [u8; 3] = [b',', b';', b'\t'];
-/// The first field of a row that replaces unreadable rows; the second field is their number.
+/// The first field of a row that replaces unreadable rows, or lost ones; the second field is their
+/// number.
 const UNREADABLE: &str = "unreadable";
+const LOST: &str = "lost";
 
 #[derive(Clone)]
 pub(crate) struct Rows {
@@ -88,10 +90,15 @@ impl Rows {
             None if is_whole && is_blank() => self.raw.unmeasured += 1,
             None => {
                 let line = self.lines + row.position().map_or(0, |at| at.line() as usize);
-                let times = row.get(1).filter(|_| row.get(0) == Some(UNREADABLE));
-                let times = times.and_then(|it| it.parse().ok()).unwrap_or(1);
+                let times = row.get(1).and_then(|it| it.parse().ok());
                 let why = || why(row, self.count);
-                self.raw.unreadable.add(times, line, why);
+                match (row.get(0), times) {
+                    (Some(LOST), Some(times)) if kind.has_blanks => {
+                        self.raw.lost = self.raw.lost.saturating_add(times);
+                    }
+                    (Some(UNREADABLE), Some(times)) => self.raw.unreadable.add(times, line, why),
+                    _ => self.raw.unreadable.add(1, line, why),
+                }
             }
         }
     }
@@ -119,6 +126,8 @@ pub(crate) struct Raw {
     pub unreadable: Unreadable,
     /// Rows or messages that state that nothing was measured.
     pub unmeasured: usize,
+    /// Messages of a live receiver that were lost.
+    pub lost: usize,
 }
 
 impl Raw {

@@ -7,8 +7,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_datasets::{Dataset, ReadError};
-use gyre_geometry::OwnedScan;
 use tempfile::TempDir;
 
 /// 2019-01-10 14:37:26 UTC, us.
@@ -160,10 +158,4 @@ pub fn write_radiate(root: &Path, n: i64) -> Vec<PathBuf> {
         path
     };
     (0..n).map(write).collect()
-}
-
-pub fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, ReadError> {
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    scan.geometry = dataset.read(index, scan.slot())?;
-    Ok(scan)
 }

@@ -111,9 +111,13 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
     assert_eq!((log.unusable, log.faults.unreadable), (None, 1));
     assert_eq!(log.faults.out_of_order, 1);
     assert_eq!(log.samples.len(), 2);
-    let noisy = format!("{text}unreadable\nunreadable,1\n");
+    let noisy = format!("{text}unreadable\nunreadable,1\nlost,5\nlost,2\n");
     let log = SampleLog::received(&written(&folder, "gnss.csv", &noisy));
     assert_eq!((log.samples.len(), log.faults.unreadable), (2, 3));
+    assert_eq!(
+        (log.faults.lost, &log.fault_figures()["lost"]),
+        (7, &7.into())
+    );
     let missing = SampleLog::received(&folder.path().join("none.csv"));
     assert!(missing.unusable.unwrap().contains("none.csv"));
 }
@@ -122,9 +126,11 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
 fn a_log_that_grows_is_read_on_to_what_it_is_as_a_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("gnss.csv");
-    let mut received = ReceivedFixes::new(&path);
     let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
+    std::fs::write(&path, &text).unwrap();
+    let mut received = ReceivedFixes::read(&path).unwrap();
     for rows in [100, 0, 1, 1, 2] {
+        let before = text.len();
         for _ in 0..rows {
             let k = text.lines().count() as i64;
             let (ns, longitude) = (START_NS + k * 10_000_000, 1e-8 * k as f64);
@@ -134,7 +140,7 @@ fn a_log_that_grows_is_read_on_to_what_it_is_as_a_whole() {
             };
         }
         std::fs::write(&path, &text).unwrap();
-        received.read_on().unwrap();
+        received.add(&text[before..]);
         let (log, whole) = (received.log(), SampleLog::read(Gnss, &path, None));
         assert_eq!(received.count(), log.samples.len());
         if rows > 0 {

@@ -9,7 +9,7 @@ use gyre_datasets::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 
 use super::{assert_rejected, first_scan_with, folder, opened, options};
 use crate::common::{
-    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_png, write_radiate,
+    PERIOD_US, START_US, Sweep, assert_refused, write_oxford, write_png, write_radiate,
 };
 
 /// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`
@@ -38,7 +38,7 @@ fn boreas_resolution_depends_on_the_date_and_its_time_is_the_middle_row() {
         write_named(&root.path().join("radar"), 3360, start_us, 19, 1);
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), Format::Boreas);
-        let scan = read(dataset.as_mut(), 1).unwrap();
+        let scan = dataset.scan(1).unwrap();
         assert_eq!(scan.geometry.range_resolution_m, resolution);
         assert_eq!(scan.geometry.range_offset_m, -0.31);
         assert_eq!(scan.geometry.stamp_ns, scan.stamp_ns[19]);
@@ -61,7 +61,7 @@ fn formats_are_detected_from_layouts_and_first_images() {
         write_named(&root.path().join(name), bins, START_US, named, unit);
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), format, "{name:?}: {:?}", dataset.notes());
-        let scan = read(dataset.as_mut(), 1).unwrap();
+        let scan = dataset.scan(1).unwrap();
         let off_ns = dataset.nominal_stamp_ns(1).unwrap() - scan.geometry.stamp_ns;
         assert!(off_ns.abs() < 5_000_000, "{name:?}: {off_ns} ns");
     }
@@ -83,7 +83,7 @@ fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
     let mut dataset = opened(root.path());
     assert_eq!(dataset.format(), Format::Mulran);
     assert!(dataset.is_transposed());
-    let scan = read(dataset.as_mut(), 2).unwrap();
+    let scan = dataset.scan(2).unwrap();
     // The name is the time of the last of 40 columns; the first column is at half a step.
     assert_eq!((scan.stamp_ns[39], scan.geometry.bins), (end(2), 60));
     assert!((scan.azimuth_rad[0] - TAU / 80.0).abs() < 1e-6);
@@ -121,8 +121,8 @@ fn a_row_that_is_a_year_off_makes_its_scan_alone_unreadable_in_every_format_with
             write_png(&path, sweep.width(), 40, &pixels);
             let options = options(|o| o.format = Some(format));
             let mut dataset = open(root.path(), &options).unwrap();
-            assert_refused(read(dataset.as_mut(), 1), "row 20: stamp is 3153");
-            assert!(read(dataset.as_mut(), 0).is_ok() && read(dataset.as_mut(), 2).is_ok());
+            assert_refused(dataset.scan(1), "row 20: stamp is 3153");
+            assert!(dataset.scan(0).is_ok() && dataset.scan(2).is_ok());
         }
     }
 }

@@ -13,7 +13,7 @@ use gyre_radar::lost::stale_rows;
 
 use super::{folder, opened, options};
 use crate::common::{
-    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_png, write_radiate,
+    PERIOD_US, START_US, Sweep, assert_refused, write_oxford, write_png, write_radiate,
     write_sweeps,
 };
 
@@ -30,7 +30,7 @@ fn written_powers_are_read_back() {
     write_oxford(root.path(), 3);
     let mut dataset = opened(root.path());
     assert_eq!((dataset.format(), dataset.len()), (Format::Oxford, 3));
-    let scan = read(dataset.as_mut(), 2).unwrap();
+    let scan = dataset.scan(2).unwrap();
     assert_powers(&scan);
     for row in 0..40 {
         assert!((scan.azimuth_rad[row] - (13 + 140 * row) as f32 / 5600.0 * TAU).abs() < 1e-6);
@@ -70,8 +70,8 @@ fn a_dataset_that_is_opened_again_has_the_scans_that_it_had() {
         let mut again = reopen(root.path(), &none, format, listed).unwrap();
         assert_eq!((again.len(), again.period_ns()), (4, dataset.period_ns()));
         assert_eq!(again.nominal_stamp_ns(1), dataset.nominal_stamp_ns(1));
-        assert!(read(again.as_mut(), 1).unwrap_err().is_io());
-        let [now, then] = [again, dataset].map(|mut dataset| read(dataset.as_mut(), 2).unwrap());
+        assert!(again.scan(1).unwrap_err().is_io());
+        let [now, then] = [again, dataset].map(|mut dataset| dataset.scan(2).unwrap());
         assert_eq!((now.bytes, now.stamp_ns), (then.bytes, then.stamp_ns));
     }
 }
@@ -102,15 +102,12 @@ fn a_radar_with_another_encoder_and_period_needs_options_only() {
         ..DatasetOptions::default()
     };
     let mut dataset = open(root.path(), &options).unwrap();
-    let scan = read(dataset.as_mut(), 1).unwrap();
+    let scan = dataset.scan(1).unwrap();
     assert_eq!((scan.geometry.azimuths, scan.geometry.bins), (120, 162));
     assert!((scan.view().range_m(161.0) - 99.9).abs() < 1e-3);
     assert!((scan.azimuth_rad[90] - 0.75 * TAU).abs() < 1e-6);
     write(START_US, 3 * turn_us / 120);
-    assert_refused(
-        read(dataset.as_mut(), 0),
-        "not one sweep of at most 2.000 s",
-    );
+    assert_refused(dataset.scan(0), "not one sweep of at most 2.000 s");
     let scan_ns = scan.geometry.stamp_ns;
     assert!((scan_ns - dataset.nominal_stamp_ns(1).unwrap()).abs() < 1_000_000);
     let middle_us = START_US + turn_us + 119 * (turn_us / 120) / 2;
@@ -122,7 +119,7 @@ fn transposed_powers_are_transposed_back() {
     let root = folder();
     write_radiate(root.path(), 4);
     let mut dataset = opened(root.path());
-    let scan = read(dataset.as_mut(), 3).unwrap();
+    let scan = dataset.scan(3).unwrap();
     let geometry = scan.geometry;
     assert_eq!((geometry.azimuths, geometry.bins), (40, 60));
     assert_eq!(geometry.range_resolution_m, 100.0 / 60.0);
@@ -147,7 +144,7 @@ fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
     fs::write(&files[5], b"").unwrap();
     let mut dataset = opened(root.path());
     let mut refused = |index, words: &str| {
-        assert_refused(read(dataset.as_mut(), index), words);
+        assert_refused(dataset.scan(index), words);
     };
     refused(1, "is truncated after");
     let rotated = "40 columns x 71 rows, but most images of the dataset are 71 columns x 40 rows: it is rotated by 90 degrees";
@@ -158,11 +155,7 @@ fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
     write(|sweep| sweep.bins = 59, &files[1]);
     refused(1, "70 columns x 40 rows, but most images");
     // The third has lost its last row.
-    assert!(
-        [0, 3, 6]
-            .iter()
-            .all(|index| read(dataset.as_mut(), *index).is_ok())
-    );
+    assert!([0, 3, 6].iter().all(|index| dataset.scan(*index).is_ok()));
 }
 
 #[test]
@@ -193,7 +186,7 @@ fn images_of_other_content_are_refused_in_plain_words() {
         fs::write(&file, bytes).unwrap();
         let scan = open(root.path(), &DatasetOptions::default())
             .map_err(|error| error.to_string())
-            .and_then(|mut dataset| read(dataset.as_mut(), 0).map_err(|error| error.to_string()));
+            .and_then(|mut dataset| dataset.scan(0).map_err(|error| error.to_string()));
         let error = scan.err().unwrap_or_default();
         assert!(error.contains(words), "{error}");
         assert!(!error.contains(['{', '\0']), "{error}");
@@ -259,7 +252,7 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
         // In any order: the last columns of scan 1 equal the last columns of scan 0.
         for index in [0, 1, 2, 3, 4, 1, 0, 2] {
             let lost = LOST[index];
-            let scan = read(dataset.as_mut(), index).unwrap();
+            let scan = dataset.scan(index).unwrap();
             assert_eq!(stale_rows(&scan.view()), lost, "{format} {index}");
             let (measured, stale) = scan.flags.split_at(AZIMUTHS - lost);
             let all = |flags: &[u8], expected| flags.iter().all(|flags| *flags == expected);
@@ -273,7 +266,7 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
 
         let ignoring = options(|o| o.lost_azimuths = Some(LostAzimuthOption::Ignore));
         let mut dataset = open(root.path(), &ignoring).unwrap();
-        let scan = read(dataset.as_mut(), 2).unwrap();
+        let scan = dataset.scan(2).unwrap();
         assert!(scan.flags.iter().all(|flags| *flags == flag::MEASURED));
     }
 }

@@ -8,7 +8,7 @@ mod series;
 
 use std::path::Path;
 
-use crate::common::{assert_refused, read};
+use crate::common::assert_refused;
 use gyre_datasets::{Dataset, DatasetOptions, ReadError, open};
 use gyre_geometry::OwnedScan;
 use tempfile::TempDir;
@@ -27,7 +27,7 @@ fn assert_rejected(root: &Path, words: &str) {
 }
 
 fn first_scan(root: &Path) -> Result<OwnedScan, ReadError> {
-    read(opened(root).as_mut(), 0)
+    opened(root).scan(0)
 }
 
 /// The default options with a change.
@@ -39,5 +39,5 @@ fn options(change: impl FnOnce(&mut DatasetOptions)) -> DatasetOptions {
 
 /// The first scan, read with a change of the default options.
 fn first_scan_with(root: &Path, change: impl FnOnce(&mut DatasetOptions)) -> OwnedScan {
-    read(open(root, &options(change)).unwrap().as_mut(), 0).unwrap()
+    open(root, &options(change)).unwrap().scan(0).unwrap()
 }

@@ -8,7 +8,7 @@ use gyre_datasets::{Dataset, DatasetOptions, Format, inspect, open, reopen};
 
 use super::{assert_rejected, folder, opened, options};
 use crate::common::{
-    PERIOD_US, START_US, Sweep, assert_refused, read, write_oxford, write_radiate, write_sweeps,
+    PERIOD_US, START_US, Sweep, assert_refused, write_oxford, write_radiate, write_sweeps,
 };
 
 /// Writes a scan of the turn `k`.
@@ -44,7 +44,7 @@ fn images_that_are_not_named_by_times_are_in_the_order_of_their_rows_times() {
             assert_eq!(dataset.period_ns(), PERIOD_US * 1000);
             let again = reopen(&images, &options, format, dataset.files().to_vec()).unwrap();
             for index in 0..5 {
-                let stamp_ns = read(dataset.as_mut(), index).unwrap().geometry.stamp_ns;
+                let stamp_ns = dataset.scan(index).unwrap().geometry.stamp_ns;
                 let middle_ns = (START_US + index as i64 * PERIOD_US + 122_000) * 1000;
                 let nominal_ns = dataset.nominal_stamp_ns(index).unwrap();
                 for expected_ns in [middle_ns, nominal_ns] {
@@ -79,7 +79,7 @@ fn a_clock_that_is_set_back_breaks_the_time_of_numbered_images_once() {
         let times: Vec<_> = (0..40).map(|k| again.nominal_stamp_ns(k)).collect();
         let back: Vec<_> = (1..40).filter(|k| times[*k] < times[k - 1]).collect();
         assert_eq!((names(again.as_ref()), back), (expected.clone(), vec![20]));
-        assert!((0..40).all(|index| read(dataset.as_mut(), index).is_ok()));
+        assert!((0..40).all(|index| dataset.scan(index).is_ok()));
     }
 }
 
@@ -152,7 +152,7 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
         assert_eq!(dataset.format(), format);
         assert_eq!(dataset.image_size().height, 40);
         for k in 0..6 {
-            let scan = read(dataset.as_mut(), k).unwrap();
+            let scan = dataset.scan(k).unwrap();
             let rows = rows_of(k as i64);
             assert_eq!(scan.geometry.azimuths, rows, "{format}, scan {k}");
             let turn = std::f32::consts::TAU;
@@ -181,8 +181,8 @@ fn an_image_without_encoder_and_with_half_a_turn_is_refused() {
     });
     let mut dataset = opened(root.path());
     let expected = "most images of the dataset are 71 columns x 40 rows";
-    assert_refused(read(dataset.as_mut(), 0), expected);
-    assert!((1..4).all(|index| read(dataset.as_mut(), index).is_ok()));
+    assert_refused(dataset.scan(0), expected);
+    assert!((1..4).all(|index| dataset.scan(index).is_ok()));
 }
 
 #[test]

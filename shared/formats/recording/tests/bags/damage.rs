@@ -13,7 +13,7 @@ fn a_recording_that_begins_within_a_turn_begins_with_the_next() {
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&messages));
     assert_eq!(dataset.len(), 3);
-    assert_is(&read(dataset.as_mut(), 0).unwrap(), 1);
+    assert_is(&dataset.scan(0).unwrap(), 1);
 }
 
 #[test]
@@ -23,13 +23,10 @@ fn damaged_messages_are_scans_that_cannot_be_read() {
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&messages));
     assert_eq!(dataset.len(), 5);
-    let Err(error) = read(dataset.as_mut(), 2) else {
-        panic!("a damaged scan was read");
-    };
-    let words = "the message of scan 2 in ";
-    assert!(error.to_string().starts_with(words), "{error}");
+    let error = dataset.scan(2).unwrap_err().to_string();
+    assert!(error.starts_with("the message of scan 2 in "), "{error}");
     for turn in [0, 1, 3, 4] {
-        assert_is(&read(dataset.as_mut(), turn).unwrap(), turn);
+        assert_is(&dataset.scan(turn).unwrap(), turn);
     }
     let notes = dataset.notes().join(" ");
     let words = "1 messages with scans cannot be decoded, and are skipped (the first: ";
@@ -75,7 +72,7 @@ fn whatever_is_damaged_of_a_chunk_it_alone_is_left_out_and_named() {
             );
             assert!(dataset.notes().join(" ").contains(&damage), "{number}");
             assert_eq!(dataset.len(), 7, "{number}");
-            assert_is(&read(dataset.as_mut(), 6).unwrap(), 7);
+            assert_is(&dataset.scan(6).unwrap(), 7);
         }
         fs::write(&path, &whole[..at + 100]).unwrap();
         let mut dataset = opened(&path);
@@ -89,11 +86,11 @@ fn whatever_is_damaged_of_a_chunk_it_alone_is_left_out_and_named() {
 }
 
 /// Writes messages into files of these names, `share` messages each.
-fn parts(folder: &Path, names: &[&str], mut messages: Messages, share: usize) {
+fn parts(folder: &Path, names: &[&str], mut messages: Messages, share: usize, chunks: bool) {
     fs::create_dir_all(folder).unwrap();
     for name in names {
         let rest = messages.0.split_off(messages.0.len().min(share));
-        messages.write(&folder.join(name), uncompressed());
+        messages.write(&folder.join(name), uncompressed().use_chunks(chunks));
         messages = Messages(rest);
     }
     assert!(messages.0.is_empty());
@@ -103,30 +100,21 @@ fn parts(folder: &Path, names: &[&str], mut messages: Messages, share: usize) {
 fn files_are_in_the_order_of_their_times_whatever_their_names_are() {
     let numbered: Vec<String> = (0..12).map(|part| format!("part-{part}.mcap")).collect();
     let numbered: Vec<&str> = numbered.iter().map(String::as_str).collect();
-    for names in [
-        &numbered[..],
-        &["z.mcap", "m_10.mcap", "m_2.mcap", "a.mcap"],
+    for (names, has_chunks) in [
+        (&numbered[..], true),
+        (&["z.mcap", "m_10.mcap", "m_2.mcap", "a.mcap"], true),
+        (&["b.mcap", "a.mcap"], false),
     ] {
         let folder = Folder::new();
         let bag = folder.path("drive");
         let messages = azimuths(12, |_, _, message| Some(message));
         let share = messages.0.len().div_ceil(names.len());
-        parts(&bag, names, messages, share);
+        parts(&bag, names, messages, share, has_chunks);
         let mut dataset = opened(&bag);
         assert_eq!(dataset.files().len(), names.len());
         assert_has_turns(dataset.as_mut(), 12);
         assert_eq!(dataset.file(0), bag.join(names[0]));
     }
-}
-
-#[test]
-fn files_without_chunks_are_in_the_order_of_their_times() {
-    let folder = Folder::new();
-    let mut messages = b_scans(6);
-    let later = Messages(messages.0.split_off(4));
-    messages.write(&folder.path("b.mcap"), uncompressed().use_chunks(false));
-    later.write(&folder.path("a.mcap"), uncompressed().use_chunks(false));
-    assert_has_turns(opened(folder.0.path()).as_mut(), 6);
 }
 
 #[test]

@@ -55,10 +55,9 @@ fn azimuths_whose_times_stand_against_the_rotation_are_named_so() {
 
 /// Asserts that the scans that are read have the times that the bag lists.
 fn assert_times(dataset: &mut dyn Dataset, turns: usize) {
-    let mut scan = OwnedScan::with_limits(dataset.limits());
     assert_eq!(dataset.len(), turns);
     for index in (0..turns).rev() {
-        let geometry = dataset.read(index, scan.slot()).unwrap();
+        let geometry = dataset.scan(index).unwrap().geometry;
         assert_eq!(dataset.nominal_stamp_ns(index), Some(geometry.stamp_ns));
     }
 }
@@ -130,7 +129,7 @@ fn both(turns: usize, said: u16, count: impl Fn(usize) -> Option<u16>) -> [Messa
 
 fn assert_angles(dataset: &mut dyn Dataset, size: u16, count: impl Fn(usize) -> Option<u16>) {
     assert_eq!(dataset.encoder_counts(), Some(size));
-    let found = read(dataset, 2).unwrap();
+    let found = dataset.scan(2).unwrap();
     for row in [0, 1, AZIMUTHS / 2] {
         let expected = count(row).map(|count| f64::from(count) / f64::from(size));
         let expected = expected.unwrap() * std::f64::consts::TAU;

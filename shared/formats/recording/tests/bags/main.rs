@@ -14,7 +14,7 @@ use std::{
 };
 
 use gyre_colossus::Configuration;
-use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError};
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError};
 use gyre_geometry::OwnedScan;
 use gyre_recording::bags::{BagWriter, Kept, is_bag, open};
 use gyre_ros2_messages::{
@@ -83,12 +83,6 @@ impl Folder {
     }
 }
 
-fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, ReadError> {
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    scan.geometry = dataset.read(index, scan.slot())?;
-    Ok(scan)
-}
-
 fn opened(path: &Path) -> Box<dyn Dataset> {
     open(path, &DatasetOptions::default()).unwrap()
 }
@@ -123,7 +117,7 @@ fn assert_is(found: &OwnedScan, turn: usize) {
 fn assert_has_turns(dataset: &mut dyn Dataset, turns: usize) {
     assert_eq!(dataset.len(), turns);
     for turn in (0..turns).chain((0..turns).rev()) {
-        assert_is(&read(dataset, turn).unwrap(), turn);
+        assert_is(&dataset.scan(turn).unwrap(), turn);
     }
 }
 

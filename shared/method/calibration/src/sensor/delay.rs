@@ -1,4 +1,4 @@
-//! The delay of a sensor against the radar, from the motions of a run.
+//! The delay and the scale of a sensor against the radar, from the motions of a run.
 
 use gyre_geometry::samples::Sample;
 use gyre_radar::median;
@@ -21,10 +21,10 @@ pub struct Compared {
     pub other: Option<f64>,
 }
 
-/// Estimates the delay of the stamps of the other sensor, s: the smallest delay that fits the
-/// measurements about as well as the best one. `None` where they do not determine it. Speeds have
-/// no bias: `has_bias` is for rates.
-pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
+/// Estimates the delay of the stamps of the other sensor, s, and its scale, the true value over the
+/// measured one. The delay is the smallest that fits the measurements about as well as the best
+/// one. `None` where they do not determine it. Speeds have no bias: `has_bias` is for rates.
+pub fn compare(motions: &[Compared], has_bias: bool) -> Option<[Estimate; 2]> {
     let first_ns = motions.first()?.stamp_ns;
     let steps: Vec<Step> = motions.iter().map(|it| (it.stamp_ns, it.radar)).collect();
     let sample = |it: &Compared| {
@@ -37,7 +37,7 @@ pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
     let log = Log::new(&samples, first_ns, 1.5 * interval_s);
     let stretches = stretches(&steps);
     let peak = Search::new(&stretches, &log, 1).nearest()?;
-    let [_, _, delay_s] = Fit::new(&stretches, &log, &peak, has_bias)?.parameters;
+    let [scale, _, delay_s] = Fit::new(&stretches, &log, &peak, has_bias)?.parameters;
     // By the turns that a search finds right gyros are up to 0.4 of an interval late.
-    Some(delay_s.with_error(0.2 * interval_s))
+    Some([delay_s.with_error(0.2 * interval_s), scale])
 }

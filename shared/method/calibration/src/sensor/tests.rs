@@ -307,9 +307,9 @@ fn drives_of_one_sensor_are_combined_if_they_name_one_axis() {
     }
 }
 
-/// The delay in a run of a sensor whose measurements are so late and scaled, beside a radar with
+/// The delay and the scale in a run of a sensor whose measurements are so late and scaled, beside a radar with
 /// noise, over 40 s with these rates.
-fn delay_in_run(rate: fn(f64) -> f64, delay_s: f64, scale: f64) -> Option<Estimate> {
+fn compared(rate: fn(f64) -> f64, delay_s: f64, scale: f64) -> Option<[Estimate; 2]> {
     let over = |s: f64| {
         let parts = (0..25).map(|k| 0.01 * rate(s - 0.01 * f64::from(k)));
         parts.sum::<f64>()
@@ -323,7 +323,7 @@ fn delay_in_run(rate: fn(f64) -> f64, delay_s: f64, scale: f64) -> Option<Estima
             other: Some(scale * over(0.25 * f64::from(k) - delay_s)),
         }
     };
-    delay(&(0..160).map(motion).collect::<Vec<_>>(), true)
+    compare(&(0..160).map(motion).collect::<Vec<_>>(), true)
 }
 
 #[test]
@@ -332,10 +332,11 @@ fn a_delay_in_a_run_is_measured_and_none_is_made_up() {
     let town = |s: f64| 0.2 * (0.4 * s).sin().powi(9) + 0.1 * (0.23 * s + 1.0).sin().powi(5);
     for (delay_s, scale) in [(-2.0, 1.0), (0.0, 0.8), (0.3, 1.3), (1.6, 1.0)] {
         for rate in [winding, town] {
-            let found = delay_in_run(rate, delay_s, scale).unwrap();
-            assert_within(found, delay_s, 0.07, "delay_s");
+            let [delay, of_scale] = compared(rate, delay_s, scale).unwrap();
+            assert_within(delay, delay_s, 0.07, "delay_s");
+            assert_within(of_scale, 1.0 / scale, 0.03, "scale");
         }
     }
-    assert_eq!(delay_in_run(|_| 0.0, 1.0, 1.0), None, "a straight road");
-    assert_eq!(delay_in_run(town, 0.0, -1.0), None, "another axis");
+    assert_eq!(compared(|_| 0.0, 1.0, 1.0), None, "a straight road");
+    assert_eq!(compared(town, 0.0, -1.0), None, "another axis");
 }

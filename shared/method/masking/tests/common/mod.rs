@@ -3,9 +3,11 @@
 // Each test binary uses a part of this.
 #![allow(dead_code, clippy::unwrap_used)]
 
+mod sweep;
+
 use std::path::{Path, PathBuf};
 
-use gyre_geometry::{OwnedScan, ScanLimits, Sense, SweepGeometry, Twist, scan::flag};
+use gyre_geometry::OwnedScan;
 use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep, networks::runtime};
 use gyre_radar::{PointsConfig, RasterConfig};
 use ndarray::Array2;
@@ -43,11 +45,7 @@ pub fn backends() -> Vec<Backend> {
 
 /// The rasters of the models with `-31` in their names.
 pub fn raster() -> RasterConfig {
-    RasterConfig {
-        n: N,
-        cell_m: 0.8,
-        ..RasterConfig::default()
-    }
+    RasterConfig::of(N, 0.8)
 }
 
 /// A learned mask of this model, above a threshold of 20.
@@ -72,9 +70,8 @@ pub fn learned_by(backend: Backend, card: &Path) -> MaskingConfig {
 pub fn unlearned() -> MaskingConfig {
     MaskingConfig {
         kind: MaskKind::Threshold,
-        threshold: 20,
-        undo_doppler: true,
-        ..MaskingConfig::default()
+        model: None,
+        ..learned(Path::new(""))
     }
 }
 
@@ -83,27 +80,10 @@ pub fn masker(config: &MaskingConfig) -> Masker {
 }
 
 pub fn scan(seed: usize) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: AZIMUTHS * BINS,
-        azimuths: AZIMUTHS,
-    });
-    scan.geometry = SweepGeometry {
-        azimuths: AZIMUTHS,
-        bins: BINS,
-        stride: BINS,
-        range_resolution_m: 0.175,
-        doppler_s: 0.04,
-        sense: Sense::Clockwise,
-        ..scan.geometry
-    };
-    for azimuth in 0..AZIMUTHS {
-        for bin in 0..BINS {
-            scan.bytes[azimuth * BINS + bin] =
-                ((azimuth / 9 * 31 + bin / 5 * 57 + seed * 101) % 251) as u8;
-        }
-        scan.azimuth_rad[azimuth] = azimuth as f32 * std::f32::consts::TAU / AZIMUTHS as f32;
-        scan.stamp_ns[azimuth] = (azimuth as i64 - AZIMUTHS as i64 / 2) * 625_000;
-        scan.flags[azimuth] = flag::MEASURED;
+    let mut scan = sweep::of(AZIMUTHS, BINS, 0.175);
+    for (place, byte) in scan.bytes.iter_mut().enumerate() {
+        let (azimuth, bin) = (place / BINS, place % BINS);
+        *byte = ((azimuth / 9 * 31 + bin / 5 * 57 + seed * 101) % 251) as u8;
     }
     scan
 }
@@ -113,11 +93,7 @@ pub fn sweep(number: u64, scan: &OwnedScan) -> Sweep<'_> {
     Sweep {
         number,
         scan: scan.view(),
-        twist: Some(Twist {
-            vx_mps: 12.0,
-            vy_mps: 0.1,
-            yaw_rate_radps: 0.2,
-        }),
+        twist: Some([12.0, 0.1, 0.2].into()),
     }
 }
 

@@ -97,10 +97,7 @@ fn a_model_for_rasters_of_another_size_is_rejected() {
     let other = RasterConfig { n: 255, ..raster() };
     let (from, to) = ("raster.n is 255", "single-31.toml is for 31");
     rejected(&config, &other, &[from, to, "set raster.n = 31"]);
-    let other = RasterConfig {
-        cell_m: 0.4,
-        ..raster()
-    };
+    let other = RasterConfig::of(31, 0.4);
     let words = ["raster.cell_m is 0.4", "set raster.cell_m = 0.8"];
     rejected(&config, &other, &words);
 }

@@ -10,7 +10,7 @@
 
 use gyre_geometry::{
     Pose,
-    samples::{Evidence, GyroConfig, SensorConfigs, Witness},
+    samples::{Evidence, GyroConfig, SensorConfig, SensorConfigs, Witness},
     wrap_angle,
 };
 use nalgebra::{Matrix5, RowVector5, Vector5};
@@ -28,8 +28,6 @@ const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 /// Random walk of the scale of wheels and Doppler, /√s: tyres that warm change it by 0.06 % in an
 /// hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
-/// Least standard deviation of such a scale around 1: the settings may be for other tyres.
-const TYRES: f64 = 0.02;
 /// Standard deviation of the offset of an absolute heading, rad: any angle.
 const OFFSET_RAD: f64 = 2.0;
 /// Random walk of that offset, rad/√s: errors of a receiver or a compass that last.
@@ -97,20 +95,21 @@ pub(super) struct SharedErrors {
 impl SharedErrors {
     /// Returns the errors of each kind, in the order of [`Witness::ALL`].
     pub fn of(configs: &SensorConfigs) -> [Self; Witness::ALL.len()] {
-        let of_scale = |scale_sigma: f64| Self {
+        let of_distance = |scale_sigma: f64, max_scale_error: f64| Self {
             bias: 0.0,
             bias_sigma: 0.0,
             bias_walk_per_sqrt_s: 0.0,
             scale_sigma,
             scale_walk_per_sqrt_s: SCALE_WALK_PER_SQRT_S,
-            max_scale_error: 4.0 * scale_sigma.max(TYRES),
+            max_scale_error,
             noise_per_sqrt_s: 0.0,
         };
+        let (wheels, doppler) = (&configs.wheels, configs.doppler.scale_sigma);
         Witness::ALL.map(|kind| match kind {
             Witness::Gyro => Self::of_gyro(&configs.gyro),
-            Witness::Wheels => of_scale(configs.wheels.scale_sigma),
+            Witness::Wheels => of_distance(wheels.scale_sigma, wheels.scale().1),
             // An absolute heading has no filter of its own.
-            _ => of_scale(configs.doppler.scale_sigma),
+            _ => of_distance(doppler, 4.0 * doppler),
         })
     }
 
@@ -195,11 +194,12 @@ impl Filter {
         }
     }
 
-    pub(super) fn witnessed(&self, measured: f64) -> Witnessed {
+    pub(super) fn witnessed(&self, measured: f64, registered: f64) -> Witnessed {
         let sigma = |state| self.covariance[(state, state)].max(0.0).sqrt();
         Witnessed {
             verdict: self.verdict,
             measured,
+            registered,
             scale: self.scale,
             scale_sigma: sigma(SCALE),
             bias: self.bias,
@@ -321,6 +321,7 @@ impl Filter {
         Witnessed {
             verdict: self.offset_verdict,
             measured: measured_rad,
+            registered: 0.0,
             scale: 1.0,
             scale_sigma: 0.0,
             bias: self.offset_rad,

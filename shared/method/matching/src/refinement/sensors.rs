@@ -8,10 +8,10 @@ use gyre_geometry::{
 use nalgebra::Matrix3;
 
 use super::{
-    Filter, Refiner, SinceMatch, Witnessed,
+    Accepted, Filter, Outcome, Refiner, SinceMatch, Witnessed,
     candidates::{Candidate, Scan},
     config::JITTER_DEG,
-    filter::{Seen, Verdict},
+    filter::{GATE, Seen, Verdict},
     predicted::{PredictedDistance, PredictedTurn, seen_distance},
     tracker::Step,
 };
@@ -19,6 +19,8 @@ use super::{
 /// Drift of the radar's heading, rad/√m: 0.03 degrees per square root of 100 m. The trajectories
 /// hardly depend on it between 0.01 and 0.1 degrees.
 const DRIFT_RAD_PER_SQRT_M: f64 = 5.2e-5;
+/// Weight of the newest jump of the heading in the running mean of their squares.
+const JUMP_GAIN: f64 = 0.05;
 const GYRO: usize = Witness::Gyro as usize;
 const DOPPLER: usize = Witness::Doppler as usize;
 
@@ -102,13 +104,24 @@ impl Refiner {
         }
     }
 
-    pub(super) fn witnessed(&self, scan: &Scan<'_>) -> [Option<Witnessed>; Witness::ALL.len()] {
+    pub(super) fn witnessed(
+        &self,
+        scan: &Scan<'_>,
+        accepted: &Accepted,
+    ) -> [Option<Witnessed>; Witness::ALL.len()] {
         Witness::ALL.map(|kind| {
             let measured = scan.step.measured[kind as usize]?;
             let filter = self.state.filters[filter_of(kind)]?;
             Some(match kind.row().measures {
                 Measures::Heading => filter.witnessed_heading(measured.value[0]),
-                Measures::Turn | Measures::Distance => filter.witnessed(measured.value[0]),
+                Measures::Turn | Measures::Distance => {
+                    let seen = self.seen(kind, &accepted.pose, 0.0);
+                    let registered = match accepted.outcome {
+                        Outcome::Predicted => 0.0,
+                        Outcome::Refined | Outcome::Weak => seen.change,
+                    };
+                    filter.witnessed(measured.value[0], registered)
+                }
             })
         })
     }
@@ -267,14 +280,22 @@ impl Refiner {
     }
 
     /// Returns the square of a jump of the heading that no sensor has measured, rad², zero of a turn
-    /// that a single match can err by: the whole scan can be turned, as by a slip of the encoder,
-    /// and the next match then takes the jump back.
-    fn jump_rad2(&self, scan: &Scan<'_>, pose: &Pose) -> f64 {
-        let is_predicted = self.state.anchors[0].is_some_and(|anchor| anchor.age_s == 0.0);
+    /// that a single match can err by, or that is usual: the whole scan can be turned, as by a slip
+    /// of the encoder, and the next match then takes the jump back.
+    fn jump_rad2(&mut self, scan: &Scan<'_>, pose: &Pose) -> f64 {
+        if self.state.anchors[0].is_none_or(|anchor| anchor.age_s > 0.0) {
+            return 0.0;
+        }
         let [predicted, _] = self.state.predict(&scan.step);
-        let jump_rad = predicted.rotation.rotation_to(&pose.rotation).angle();
-        match is_predicted && jump_rad.abs() > JITTER_DEG.to_radians() {
-            true => jump_rad.powi(2),
+        let jump_rad2 = predicted
+            .rotation
+            .rotation_to(&pose.rotation)
+            .angle()
+            .powi(2);
+        let usual_rad2 = GATE * self.state.mean_jump_rad2;
+        self.state.mean_jump_rad2 += JUMP_GAIN * (jump_rad2 - self.state.mean_jump_rad2);
+        match jump_rad2 > usual_rad2.max(JITTER_DEG.to_radians().powi(2)) {
+            true => jump_rad2,
             false => 0.0,
         }
     }

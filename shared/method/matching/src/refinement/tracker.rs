@@ -39,6 +39,8 @@ pub struct TrackerState {
     /// Displacement by the search beyond such guesses, m, along the axes of the map.
     pub ahead_m: Vector2<f64>,
     pub standstill: Standstill,
+    /// Running mean of the squares of what registered and predicted heading are apart, rad².
+    pub mean_jump_rad2: f64,
     /// The bias and the scale of each sensor, and the like, in the order of [`Witness::ALL`]; `None`
     /// until it has measured something.
     pub filters: [Option<Filter>; Witness::ALL.len()],

@@ -33,7 +33,7 @@ pub fn repair(scan: &PolarScan<'_>, lost: &LostAzimuths, into: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gyre_geometry::scan::{OwnedScan, ScanLimits, flag};
+    use gyre_geometry::scan::{OwnedScan, SweepGeometry, flag};
 
     const AZIMUTHS: usize = 12;
     const BINS: usize = 2;
@@ -41,12 +41,12 @@ mod tests {
     /// Returns the first bins of the repaired azimuths of a scan whose rows have these powers, with
     /// `stale` ones behind.
     fn repaired(rows: &[u8], stale: usize, lost: &[[u16; 2]]) -> Vec<u8> {
-        let mut scan = OwnedScan::with_limits(ScanLimits {
-            bytes: AZIMUTHS * BINS,
+        let mut scan = OwnedScan::of(SweepGeometry {
             azimuths: AZIMUTHS,
+            bins: BINS,
+            stride: BINS,
+            ..SweepGeometry::default()
         });
-        scan.geometry.azimuths = AZIMUTHS;
-        (scan.geometry.bins, scan.geometry.stride) = (BINS, BINS);
         scan.flags.fill(flag::MEASURED | flag::ASSUMED);
         scan.flags[AZIMUTHS - stale..].fill(flag::STALE | flag::ASSUMED);
         for (row, power) in rows.iter().enumerate() {

@@ -2,7 +2,7 @@ use std::{collections::BTreeSet, f64::consts::TAU};
 
 use gyre_geometry::{
     Twist,
-    scan::{OwnedScan, ScanLimits, Sense},
+    scan::{OwnedScan, SweepGeometry},
 };
 
 use super::*;
@@ -23,16 +23,15 @@ fn world(seed: u64) -> Vec<[f64; 2]> {
 
 /// The scan of a turn from `start_s` on, measured while moving.
 fn scan(world: &[[f64; 2]], twist: &Twist, start_s: f64) -> OwnedScan {
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: AZIMUTHS * BINS,
-        azimuths: AZIMUTHS,
-    });
-    scan.geometry.azimuths = AZIMUTHS;
-    (scan.geometry.bins, scan.geometry.stride) = (BINS, BINS);
-    scan.geometry.range_resolution_m = BIN_M;
-    scan.geometry.sense = Sense::Clockwise;
     let time_s = |azimuth: f64| start_s + TURN_S * azimuth / AZIMUTHS as f64;
-    scan.geometry.stamp_ns = (time_s(200.0) * 1e9) as i64;
+    let mut scan = OwnedScan::of(SweepGeometry {
+        azimuths: AZIMUTHS,
+        bins: BINS,
+        stride: BINS,
+        range_resolution_m: BIN_M,
+        stamp_ns: (time_s(200.0) * 1e9) as i64,
+        ..SweepGeometry::default()
+    });
     for azimuth in 0..AZIMUTHS {
         scan.stamp_ns[azimuth] = (time_s(azimuth as f64) * 1e9) as i64;
         scan.azimuth_rad[azimuth] = (azimuth as f64 / AZIMUTHS as f64 * TAU) as f32;
@@ -80,11 +79,7 @@ fn lost_azimuths_are_found_where_they_were_lost() {
     let mut distances = Vec::new();
     for case in 0..40_u64 {
         let share = |step: f64| ((case + 1) as f64 * step).fract();
-        let twist = Twist {
-            vx_mps: 30.0 * share(0.618) - 5.0,
-            vy_mps: 0.1,
-            yaw_rate_radps: 0.8 * share(0.755) - 0.4,
-        };
+        let twist = Twist::from([30.0 * share(0.618) - 5.0, 0.1, 0.8 * share(0.755) - 0.4]);
         let world = world(case);
         // In the scan before some were lost too, at places that are known by now.
         let mut before = scan(&world, &twist, 0.0);
@@ -111,11 +106,7 @@ fn lost_azimuths_are_found_where_they_were_lost() {
 
 #[test]
 fn bursts_are_found_wherever_they_are_and_counted_where_they_are_not() {
-    let [twist, predicted] = [0.1, 0.14].map(|yaw_rate_radps| Twist {
-        vx_mps: 8.0,
-        vy_mps: 0.1,
-        yaw_rate_radps,
-    });
+    let [twist, predicted] = [0.1, 0.14].map(|yaw_rate| Twist::from([8.0, 0.1, yaw_rate]));
     let before = scan(&world(3), &twist, 0.0);
     let whole = scan(&world(3), &twist, TURN_S);
     // The first azimuth of each burst and their number.

@@ -86,15 +86,14 @@ impl BearingTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gyre_geometry::scan::{OwnedScan, ScanLimits};
+    use gyre_geometry::scan::{OwnedScan, SweepGeometry};
 
     /// The table of a scan with azimuths (degrees) and times (seconds) only.
     fn measured(azimuths: &[(f32, f64)]) -> BearingTable {
-        let mut scan = OwnedScan::with_limits(ScanLimits {
-            bytes: 0,
+        let mut scan = OwnedScan::of(SweepGeometry {
             azimuths: azimuths.len(),
+            ..SweepGeometry::default()
         });
-        scan.geometry.azimuths = azimuths.len();
         for (i, &(degrees, time_s)) in azimuths.iter().enumerate() {
             scan.azimuth_rad[i] = degrees.to_radians();
             scan.stamp_ns[i] = (time_s * 1e9) as i64;

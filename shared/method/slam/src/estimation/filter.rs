@@ -237,10 +237,5 @@ impl Observation {
 
 /// Returns the motion of the world with a constant twist of (x, y, yaw) for one unit of time.
 fn exp(error: &Vector3<f64>) -> Pose {
-    let twist = Twist {
-        vx_mps: error.x,
-        vy_mps: error.y,
-        yaw_rate_radps: error.z,
-    };
-    twist.pose_at(1.0)
+    Twist::from([error.x, error.y, error.z]).pose_at(1.0)
 }

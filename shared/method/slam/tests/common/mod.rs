@@ -1,9 +1,9 @@
-//! A drive several times around a block with scattered reflectors, seen from each keyframe.
-#![allow(dead_code, reason = "each test uses a part")]
+//! A drive several times around a block with scattered reflectors, seen from each keyframe; and
+//! what all tests use.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, fmt::Display};
 
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
+use gyre_geometry::{Pose, SparsePoint, UncertainMotion, pose};
 use gyre_slam::Keyframe;
 use nalgebra::{Matrix3, Point2, Vector3};
 use rand::{Rng, SeedableRng};
@@ -15,6 +15,46 @@ pub const AROUND: usize = 60;
 const STEP_M: f64 = 2.0;
 /// Standard deviations of a motion.
 const SIGMA: [f64; 3] = [0.03, 0.03, 0.002];
+
+/// Asserts that something is refused in a sentence with these words.
+#[track_caller]
+pub fn assert_refused<T>(result: Result<T, impl Display>, words: &str) {
+    let sentence = result.err().map(|error| error.to_string());
+    let is_it = sentence.as_ref().is_some_and(|it| it.contains(words));
+    assert!(is_it, "{words:?} is not in {sentence:?}");
+}
+
+/// The keyframes of a path by odometry, whose motions have these standard deviations; the points
+/// are drawn after each motion.
+pub fn reckoned(
+    truth: &[Pose],
+    sigma: [f64; 3],
+    random: &mut ChaCha8Rng,
+    mut points: impl FnMut(&Pose, &mut ChaCha8Rng) -> Vec<SparsePoint>,
+) -> Vec<Keyframe> {
+    let covariance = Matrix3::from_diagonal(&Vector3::from(sigma.map(|sigma| sigma * sigma)));
+    let (mut reckoned, mut motion) = (UncertainMotion::identity(), UncertainMotion::identity());
+    let mut keyframe = |k: usize| {
+        if k > 0 {
+            let [x, y, yaw] = sigma.map(|sigma| Normal::new(0.0, sigma).unwrap().sample(random));
+            let exact = truth[k - 1].inv_mul(&truth[k]);
+            let measured = pose(x, y, 0.0) * exact * pose(0.0, 0.0, yaw);
+            motion = UncertainMotion {
+                motion: measured,
+                covariance,
+            };
+        }
+        reckoned = reckoned.then(&motion).normalized();
+        let points = points(&truth[k], random);
+        Keyframe {
+            stamp_ns: k as i64 * 1_000_000_000,
+            motion: motion.normalized(),
+            path_m: STEP_M * k as f64,
+            ..Keyframe::standing(4 * k as u64, reckoned, points)
+        }
+    };
+    (0..truth.len()).map(&mut keyframe).collect()
+}
 
 pub struct Drive {
     pub truth: Vec<Pose>,
@@ -37,53 +77,16 @@ impl Drive {
                 )
             })
             .collect();
-        let covariance = Matrix3::from_diagonal(&Vector3::from(SIGMA.map(|sigma| sigma * sigma)));
-        let mut drive = Self {
-            truth,
-            keyframes: Vec::new(),
-        };
-        let mut reckoned = UncertainMotion::identity();
-        for k in 0..keyframes {
-            let motion = match k {
-                0 => UncertainMotion::identity(),
-                _ => {
-                    let [x, y, yaw] =
-                        SIGMA.map(|sigma| Normal::new(0.0, sigma).unwrap().sample(&mut random));
-                    let exact = drive.truth[k - 1].inv_mul(&drive.truth[k]);
-                    let motion = pose(x, y, 0.0) * exact * pose(0.0, 0.0, yaw);
-                    UncertainMotion { motion, covariance }
-                }
-            };
-            reckoned = reckoned.then(&motion).normalized();
-            let points = drive.points(k, &reflectors, &mut random);
-            drive.keyframes.push(Keyframe {
-                seq: 4 * k as u64,
-                scan: 4 * k as u64,
-                stamp_ns: k as i64 * 1_000_000_000,
-                pose: reckoned,
-                motion: motion.normalized(),
-                noise: Matrix3::zeros(),
-                twist: Twist::default(),
-                path_m: STEP_M * k as f64,
-                points,
-            });
-        }
-        drive
-    }
-
-    fn points(
-        &self,
-        k: usize,
-        reflectors: &[Point2<f64>],
-        random: &mut ChaCha8Rng,
-    ) -> Vec<SparsePoint> {
-        let seen = reflectors.iter().map(|at| self.truth[k].inverse() * at);
-        seen.filter(|at| at.coords.norm() < 75.0)
-            .map(|at| {
+        let points = |here: &Pose, random: &mut ChaCha8Rng| {
+            let seen = reflectors.iter().map(|at| here.inverse() * at);
+            let measured = seen.filter(|at| at.coords.norm() < 75.0).map(|at| {
                 let mut noise = || random.random_range(-0.05..0.05);
                 let (x, y) = (at.x + noise(), at.y + noise());
                 SparsePoint::from([x as f32, y as f32, 0.0, 0.8, 0.0])
-            })
-            .collect()
+            });
+            measured.collect()
+        };
+        let keyframes = reckoned(&truth, SIGMA, &mut random, points);
+        Self { truth, keyframes }
     }
 }

@@ -15,7 +15,11 @@ fn along(x_m: f64, x: f64) -> UncertainMotion {
 }
 
 fn straight(motions: usize) -> TrajectoryFilter {
-    let mut filter = TrajectoryFilter::new(Pose::identity(), TrajectoryFilter::MAX_KEYFRAMES);
+    straight_of(TrajectoryFilter::MAX_KEYFRAMES, motions)
+}
+
+fn straight_of(limit: usize, motions: usize) -> TrajectoryFilter {
+    let mut filter = TrajectoryFilter::new(Pose::identity(), limit);
     for k in 0..motions {
         filter
             .apply(&Constraint::odometry(k, along(1.0, 1.0)))
@@ -71,12 +75,7 @@ fn the_covariance_stays_symmetric_and_positive_through_many_loops() {
 
 #[test]
 fn a_full_filter_refuses_the_next_keyframe_and_says_what_to_do() {
-    let mut filter = TrajectoryFilter::new(Pose::identity(), 3);
-    for k in 0..2 {
-        filter
-            .apply(&Constraint::odometry(k, along(1.0, 1.0)))
-            .unwrap();
-    }
+    let mut filter = straight_of(3, 2);
     let refused = filter.apply(&Constraint::odometry(2, along(1.0, 1.0)));
     assert_eq!(refused, Err(EstimationError::TooManyKeyframes { limit: 3 }));
     assert_eq!(filter.poses().len(), 3);

@@ -1,7 +1,7 @@
 //! The evidence that keyframes leave in the cells.
 
 use gyre_geometry::{SparsePoint, Twist, pose};
-use gyre_slam::mapping::{Evidence, MapOptions};
+use gyre_slam::mapping::MapOptions;
 use nalgebra::Point2;
 
 use crate::maps::scenes::*;
@@ -26,10 +26,7 @@ fn a_wall_is_as_bright_in_larger_cells() {
             cell_m,
             ..MapOptions::default()
         };
-        let mut evidence = Evidence::new(&options, &std::env::temp_dir()).unwrap();
-        for (pose, keyframe) in drive(40, &wall()) {
-            evidence.draw(&keyframe, &pose).unwrap();
-        }
+        let mut evidence = drawn_with(&options, &drive(40, &wall()));
         // The wall is between two rows of larger cells.
         let rows = [19.9, 20.1].map(|y_m| cell(&mut evidence, 0.1, y_m).evidence);
         f64::from(rows[0].max(rows[1]))
@@ -47,10 +44,7 @@ fn a_wall_is_as_bright_in_larger_cells() {
 fn doppler_and_motion_leave_no_second_wall() {
     // A wall square ahead of a keyframe at 10 m/s on the way there, and behind it on the way back.
     let measured = |x_m: f32| SparsePoint::from([x_m, 0.0, 0.0, 1.0, 0.042]);
-    let twist = Twist {
-        vx_mps: 10.0,
-        ..Twist::default()
-    };
+    let twist = Twist::from([10.0, 0.0, 0.0]);
     let mut there = keyframe(0, &pose(0.0, 0.0, 0.0), &[]);
     (there.twist, there.points) = (twist, vec![measured(20.1 - 0.42)]);
     let back = pose(0.0, 0.0, std::f64::consts::PI);

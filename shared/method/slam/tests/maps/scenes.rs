@@ -1,6 +1,6 @@
 //! Keyframes with simulated points of a scene.
 
-use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
+use gyre_geometry::{Pose, SparsePoint, UncertainMotion, pose};
 use gyre_slam::{
     Keyframe,
     mapping::{Cell, Evidence, MapOptions, TILE_CELLS, TileImage, TileIndex, TileSource},
@@ -20,24 +20,9 @@ pub fn keyframe(seq: u64, pose: &Pose, places: &[Point2<f64>]) -> Keyframe {
         let seen = pose.inverse() * place;
         SparsePoint::from([seen.x as f32, seen.y as f32, 0.0, 1.0, 0.0])
     });
-    Keyframe {
-        seq,
-        scan: seq,
-        stamp_ns: seq as i64 * 250_000_000,
-        pose: UncertainMotion {
-            motion: *pose,
-            ..UncertainMotion::identity()
-        },
-        motion: UncertainMotion::identity(),
-        noise: nalgebra::Matrix3::zeros(),
-        twist: Twist::default(),
-        path_m: 0.0,
-        points: points.collect(),
-    }
-}
-
-pub fn evidence() -> Evidence {
-    Evidence::new(&MapOptions::default(), &std::env::temp_dir()).unwrap()
+    let mut keyframe = Keyframe::standing(seq, UncertainMotion::identity(), points.collect());
+    keyframe.pose.motion = *pose;
+    keyframe
 }
 
 pub fn drive(count: u64, places: &[Point2<f64>]) -> Vec<(Pose, Keyframe)> {
@@ -50,7 +35,11 @@ pub fn drive(count: u64, places: &[Point2<f64>]) -> Vec<(Pose, Keyframe)> {
 }
 
 pub fn drawn(drive: &[(Pose, Keyframe)]) -> Evidence {
-    let mut evidence = evidence();
+    drawn_with(&MapOptions::default(), drive)
+}
+
+pub fn drawn_with(options: &MapOptions, drive: &[(Pose, Keyframe)]) -> Evidence {
+    let mut evidence = Evidence::new(options, &std::env::temp_dir()).unwrap();
     for (pose, keyframe) in drive {
         evidence.draw(keyframe, pose).unwrap();
     }

@@ -10,6 +10,7 @@ use gyre_transport::{
     writer::Writer,
 };
 
+use super::fixes::Fixes;
 use crate::{Launch, schedule::ScheduleWriter};
 
 /// Time without need for the supervisor to intervene: a source that waits for a sensor or for
@@ -26,6 +27,8 @@ pub(crate) struct Feed<'a, M> {
     pub schedule: ScheduleWriter,
     pub outputs: Vec<Writer<M>>,
     pub counters: StageCounters,
+    /// `None`: the run has no live receiver of GNSS.
+    pub fixes: Option<Fixes>,
     may_have_new_readers: bool,
     /// Time of the last sign of life of a source that is never late, `CLOCK_MONOTONIC`, ns.
     said_ns: Option<i64>,
@@ -55,6 +58,7 @@ impl<'a, M> Feed<'a, M> {
             schedule: ScheduleWriter::create(&launch.manifest)?,
             outputs: outputs()?,
             counters: StageCounters::default(),
+            fixes: Fixes::open(launch)?,
             may_have_new_readers: false,
             said_ns: None,
         })
@@ -111,9 +115,9 @@ impl<'a, M> Feed<'a, M> {
         self.sleep_until(None, None, limit)
     }
 
-    /// Answers the handshakes of new readers, and sleeps until there is a pose, or something to
-    /// read on a connection or at a listener. In this order, since the scan that has become due
-    /// when the sleep ends goes first.
+    /// Answers the handshakes of new readers, publishes the fixes that have arrived, and sleeps
+    /// until there is a pose, or something to read on a connection or at a listener. In this order,
+    /// since the scan that has become due when the sleep ends goes first.
     pub fn sleep_until<'fd>(
         &mut self,
         listener: Option<&Listener>,
@@ -129,6 +133,7 @@ impl<'a, M> Feed<'a, M> {
         if mem::take(&mut self.may_have_new_readers) {
             outputs.clone().try_for_each(Writer::accept_readers)?;
         }
+        self.fixes.iter_mut().try_for_each(Fixes::receive)?;
         let handshakes: Vec<_> = outputs.map(Writer::listener).collect();
         let mut data = vec![self.credit.poses.listener()];
         data.extend(listener);
@@ -144,16 +149,20 @@ impl<'a, M> Feed<'a, M> {
     }
 
     pub fn end(&mut self, item: Item) -> Result<(), RunError> {
+        // Those of the drive are there before its end.
+        self.fixes.iter_mut().try_for_each(Fixes::receive)?;
         let mut outputs = self.outputs.iter();
         outputs.try_for_each(|output| output.end(item, Some(StageId::RadarReplay)))?;
         self.schedule.has_published(item.published)
     }
 
-    pub fn finish(self, ended: Result<(), RunError>) -> Result<StageCounters, RunError> {
+    pub fn finish(mut self, ended: Result<(), RunError>) -> Result<StageCounters, RunError> {
         match ended {
-            Ok(()) | Err(RunError::Stopped) => Ok(self.counters),
-            Err(error) => Err(error),
+            Ok(()) | Err(RunError::Stopped) => {}
+            Err(error) => return Err(error),
         }
+        self.fixes.iter_mut().try_for_each(Fixes::receive)?;
+        Ok(self.counters)
     }
 }
 

@@ -4,10 +4,10 @@
 use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_contract::{
-    Intake, IntakeHeader, NumberedBy, Scan, ScanHeader, StageId, control::Received,
+    GnssHeader, Intake, IntakeHeader, NumberedBy, Scan, ScanHeader, StageId, control::Received,
     run::StageCounters,
 };
-use gyre_geometry::samples::{Sample, SampleKind};
+use gyre_geometry::samples::{MAX_SAMPLES, Sample, SampleKind};
 use gyre_transport::{
     Generation, RunError, clock,
     numbers::Numbers,
@@ -44,6 +44,11 @@ pub trait Sensor {
 
     /// The descriptor that becomes readable when such a sample has come.
     fn samples(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    /// Takes the next message of a GNSS receiver that comes with the sensor.
+    fn fix(&mut self) -> Option<GnssHeader> {
         None
     }
 
@@ -136,7 +141,12 @@ impl Stream<'_> {
         loop {
             let work = Work::begin();
             let (header, bytes) = draft.parts();
-            match sensor.take(header, bytes)? {
+            let arrival = sensor.take(header, bytes)?;
+            if let Some(fixes) = &mut self.feed.fixes {
+                let mut arrived = (0..MAX_SAMPLES).map_while(|_| sensor.fix());
+                arrived.try_for_each(|fix| fixes.publish(fix))?;
+            }
+            match arrival {
                 Arrival::Scan => {
                     work.end(&mut self.feed.counters);
                     return Ok(work.started_ns);

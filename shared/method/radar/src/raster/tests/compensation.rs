@@ -42,7 +42,7 @@ proptest! {
     ) {
         // Tyres allow a lateral acceleration of some 8 m/s^2.
         let yaw_rate_radps = yaw_rate * (8.0 / vx.abs()).min(1.0);
-        let twist = Twist { vx_mps: vx, vy_mps: vy, yaw_rate_radps };
+        let twist = Twist::from([vx, vy, yaw_rate_radps]);
         let sense = if clockwise { Sense::Clockwise } else { Sense::CounterClockwise };
         let sensor = Sensor { twist, sense, ..Sensor::navtech() };
         let miss = worst_miss(&RasterConfig::default(), &sensor, Some(twist));
@@ -52,11 +52,7 @@ proptest! {
 
 #[test]
 fn doppler_shifts_are_compensated_chirp_by_chirp() {
-    let twist = Twist {
-        vx_mps: 20.0,
-        vy_mps: 0.5,
-        yaw_rate_radps: 0.3,
-    };
+    let twist = Twist::from([20.0, 0.5, 0.3]);
     for (sense, chirps_alternate, doppler_s) in [
         (Sense::Clockwise, false, 0.042),
         (Sense::CounterClockwise, false, -0.042),
@@ -71,11 +67,7 @@ fn doppler_shifts_are_compensated_chirp_by_chirp() {
         };
         for config in [
             RasterConfig::default(),
-            RasterConfig {
-                cell_m: 0.4,
-                n: 511,
-                ..RasterConfig::default()
-            },
+            RasterConfig::of(511, 0.4),
             RasterConfig {
                 sampling: Sampling::Bilinear,
                 ..RasterConfig::default()
@@ -92,11 +84,7 @@ fn doppler_shifts_are_compensated_chirp_by_chirp() {
 
 #[test]
 fn stamps_in_bursts_are_used_as_they_are() {
-    let twist = Twist {
-        vx_mps: 20.0,
-        vy_mps: 0.0,
-        yaw_rate_radps: 0.3,
-    };
+    let twist = Twist::from([20.0, 0.0, 0.3]);
     let mut sensor = Sensor {
         twist,
         ..Sensor::navtech()

@@ -22,11 +22,7 @@ fn scatterers_are_placed_at_every_size() {
     .map(|(x, y)| Point2::new(x, y));
     let scan = Sensor::navtech().measure(&places, SIGMA_M);
     for n in [127, 128, 254, 255, 256, 511] {
-        let config = RasterConfig {
-            n,
-            cell_m: 102.0 / n as f32,
-            ..RasterConfig::default()
-        };
+        let config = RasterConfig::of(n, 102.0 / n as f32);
         let raster = raster(&config, &scan, None);
         for place in &places {
             let miss = miss_cells(&config, &raster, place, 4.0 * SIGMA_M);
@@ -37,11 +33,7 @@ fn scatterers_are_placed_at_every_size() {
 
 #[test]
 fn a_row_to_the_right_is_drawn_to_the_right() {
-    let config = RasterConfig {
-        n: 51,
-        cell_m: 1.0,
-        ..RasterConfig::default()
-    };
+    let config = RasterConfig::of(51, 1.0);
     for (sense, column) in [(Sense::Clockwise, 45), (Sense::CounterClockwise, 5)] {
         let sensor = Sensor {
             sense,

@@ -89,40 +89,28 @@ fn difference(got: &[f32], expected: &[f64]) -> (f64, f64) {
 
 fn config(n: usize, sampling: Sampling) -> RasterConfig {
     RasterConfig {
-        n,
-        cell_m: 0.8,
         sampling,
-        ..RasterConfig::default()
+        ..RasterConfig::of(n, 0.8)
     }
 }
 
 #[test]
-fn bilinear_raster_equals_direct_interpolation() {
-    let config = config(127, Sampling::Bilinear);
-    for (resolution_m, bins) in [(0.0438, 1100), (0.1736, 300)] {
-        let scan = noise(resolution_m, bins);
-        let (rms, largest) =
-            difference(&raster(&config, &scan, None), &direct(&config, &scan, None));
-        assert!(
-            rms < 0.05 && largest < 1.5,
-            "{resolution_m} m: {rms}, maximum {largest}"
-        );
-    }
-}
-
-#[test]
-fn averaged_raster_equals_direct_mean() {
-    let config = config(127, Sampling::Averaged);
-    for (resolution_m, bins) in [(0.0438, 1100), (0.0596, 800)] {
-        let scan = noise(resolution_m, bins);
-        let depth = f64::from(config.cell_m / resolution_m);
-        let expected = direct(&config, &scan, Some(depth));
+fn rasters_equal_direct_interpolation_or_the_direct_mean() {
+    // The mean is 127, with a standard deviation of 17 or more between cells; only the ends of the
+    // windows differ.
+    for (sampling, resolution_m, bins, limits) in [
+        (Sampling::Bilinear, 0.0438, 1100, [0.05, 1.5]),
+        (Sampling::Bilinear, 0.1736, 300, [0.05, 1.5]),
+        (Sampling::Averaged, 0.0438, 1100, [2.5, 20.0]),
+        (Sampling::Averaged, 0.0596, 800, [2.5, 20.0]),
+    ] {
+        let (config, scan) = (config(127, sampling), noise(resolution_m, bins));
+        let depth = (sampling == Sampling::Averaged).then_some(config.cell_m / resolution_m);
+        let expected = direct(&config, &scan, depth.map(f64::from));
         let (rms, largest) = difference(&raster(&config, &scan, None), &expected);
-        // The mean is 127, with a standard deviation of 17 or more between cells; only the ends of
-        // the windows differ.
         assert!(
-            rms < 2.5 && largest < 20.0,
-            "{resolution_m} m: {rms}, maximum {largest}"
+            rms < limits[0] && largest < limits[1],
+            "{sampling:?}, {resolution_m} m: {rms}, maximum {largest}"
         );
     }
 }

@@ -12,11 +12,7 @@ use super::scene::{STAMP_NS, Sensor, raster};
 use crate::raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 
 fn small() -> RasterConfig {
-    RasterConfig {
-        n: 33,
-        cell_m: 1.0,
-        ..RasterConfig::default()
-    }
+    RasterConfig::of(33, 1.0)
 }
 
 fn sensor(azimuths: usize, bins: usize) -> Sensor {
@@ -117,13 +113,8 @@ fn numbers_out_of_bounds_are_rejected() {
 #[test]
 fn motions_out_of_bounds_are_rejected() {
     let scan = sensor(400, 100).scan();
-    let is_rejected = |scan: &OwnedScan, [vx_mps, vy_mps, yaw_rate_radps]: [f64; 3]| {
-        let twist = Twist {
-            vx_mps,
-            vy_mps,
-            yaw_rate_radps,
-        };
-        let rejected = try_raster(scan, Some(twist));
+    let is_rejected = |scan: &OwnedScan, twist: [f64; 3]| {
+        let rejected = try_raster(scan, Some(twist.into()));
         assert!(matches!(rejected, Err(RasterError::Twist { .. })));
     };
     is_rejected(&scan, [f64::NAN, 0.0, 0.0]);
@@ -147,11 +138,7 @@ fn settings_out_of_bounds_are_rejected_by_name() {
 fn the_previous_scan_leaves_no_trace() {
     let config = RasterConfig::default();
     let place = [Point2::new(20.0, 10.0)];
-    let twist = Twist {
-        vx_mps: 12.0,
-        vy_mps: 0.0,
-        yaw_rate_radps: 0.2,
-    };
+    let twist = Twist::from([12.0, 0.0, 0.2]);
     let navtech = Sensor::navtech();
     let other = Sensor {
         bins: 576,
@@ -202,7 +189,7 @@ proptest! {
         }
         let sampling = if bilinear { Sampling::Bilinear } else { Sampling::Averaged };
         let config = RasterConfig { sampling, ..small() };
-        let twist = moving.then_some(Twist { vx_mps: vx, vy_mps: 0.0, yaw_rate_radps: yaw_rate });
+        let twist = moving.then_some([vx, 0.0, yaw_rate].into());
         let mut out = Array2::from_elem((33, 33), f32::NAN);
         Rasteriser::new(&config).unwrap().rasterise(&scan.view(), floor, twist, out.view_mut()).unwrap();
         let most = f32::from(255 - floor);

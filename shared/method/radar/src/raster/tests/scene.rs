@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use gyre_geometry::{
     Twist,
-    scan::{OwnedScan, ScanLimits, Sense, SweepGeometry, flag},
+    scan::{OwnedScan, Sense, SweepGeometry, flag},
 };
 use nalgebra::Point2;
 use ndarray::Array2;
@@ -53,11 +53,7 @@ impl Sensor {
     pub fn scan(&self) -> OwnedScan {
         let azimuths = self.azimuth_rad.len();
         let stride = METADATA + self.bins;
-        let mut scan = OwnedScan::with_limits(ScanLimits {
-            bytes: azimuths * stride,
-            azimuths,
-        });
-        scan.geometry = SweepGeometry {
+        let mut scan = OwnedScan::of(SweepGeometry {
             azimuths,
             bins: self.bins,
             stride,
@@ -67,12 +63,12 @@ impl Sensor {
             doppler_s: self.doppler_s,
             sense: self.sense,
             stamp_ns: STAMP_NS,
-        };
+        });
         scan.azimuth_rad.copy_from_slice(&self.azimuth_rad);
         let stamp_ns = |time_s: &f64| STAMP_NS + (time_s * 1e9).round() as i64;
         scan.stamp_ns = self.time_s.iter().map(stamp_ns).collect();
         for (azimuth, flags) in scan.flags.iter_mut().enumerate() {
-            *flags = flag::MEASURED | self.chirp(azimuth);
+            *flags |= self.chirp(azimuth);
         }
         scan
     }

@@ -2,12 +2,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use gyre_geometry::{Pose, pose, wrap_angle};
+use gyre_geometry::{pose, wrap_angle};
 use gyre_matching::Submap;
 use gyre_slam::estimation::places::{Descriptor, OrderError, PlaceIndex};
 use proptest::prelude::*;
 
-use super::scenes::{self, describe};
+use super::scenes::{self, describe, described};
 
 fn index_of(descriptors: &[Descriptor]) -> PlaceIndex {
     let mut index = PlaceIndex::default();
@@ -24,9 +24,8 @@ proptest! {
         seed in 0_u64..1000, x in -2.0_f64..2.0, y in -2.0_f64..2.0, yaw in -3.1_f64..3.1,
     ) {
         let place = scenes::place(seed);
-        let earlier = describe(&scenes::seen(&place, &Pose::identity()));
         let later = describe(&scenes::seen(&place, &pose(x, y, yaw)));
-        let mut index = index_of(&[describe(&scenes::seen(&scenes::place(seed + 1), &Pose::identity())), earlier]);
+        let mut index = index_of(&[described(seed + 1), described(seed)]);
         let found = index.query(&later, 2, 0.0);
         prop_assert!(found[0].place == 1 && found[0].score > found[1].score + 0.1, "{found:?}");
         prop_assert!(found[0].yaw_rad.abs() <= FRAC_PI_2);
@@ -55,26 +54,17 @@ fn a_rotation_hardly_changes_the_sieve() {
 
 #[test]
 fn an_empty_submap_is_similar_to_nothing() {
-    let (empty, full) = (
-        describe(&Submap::default()),
-        describe(&scenes::seen(&scenes::place(1), &Pose::identity())),
-    );
+    let (empty, full) = (describe(&Submap::default()), described(1));
     assert_eq!(empty, Descriptor::default());
     let mut index = index_of(&[empty.clone(), full.clone()]);
-    assert!(
-        index
-            .query(&empty, 2, 0.0)
-            .iter()
-            .all(|found| found.score == 0.0)
-    );
+    let mut found = index.query(&empty, 2, 0.0).iter();
+    assert!(found.all(|found| found.score == 0.0));
     assert_eq!(index.query(&full, 1, 0.0)[0].score, 0.0);
 }
 
 #[test]
 fn only_eligible_places_are_found_and_those_near_a_better_one_are_left_out() {
-    let descriptors: Vec<Descriptor> = (0..50)
-        .map(|seed| describe(&scenes::seen(&scenes::place(seed), &Pose::identity())))
-        .collect();
+    let descriptors: Vec<Descriptor> = (0..50).map(described).collect();
     let mut index = index_of(&descriptors);
     let best = index.query(&descriptors[40], 50, 0.0)[0];
     assert_eq!(best.place, 40);
@@ -83,21 +73,14 @@ fn only_eligible_places_are_found_and_those_near_a_better_one_are_left_out() {
     assert!(by_angles[0] == best && by_angles.len() > 50);
     assert!(by_angles.is_sorted_by(|a, b| a.score >= b.score));
     assert_eq!(index.query(&descriptors[40], 50, 0.0).len(), 32);
-    assert!(
-        index
-            .query(&descriptors[40], 40, 0.0)
-            .iter()
-            .all(|found| found.place < 40)
-    );
+    let mut earlier = index.query(&descriptors[40], 40, 0.0).iter();
+    assert!(earlier.all(|found| found.place < 40));
     assert_eq!(index.query(&descriptors[40], 0, 0.0), []);
     let found = index.query(&descriptors[40], 50, 50.0).to_vec();
     assert_eq!(found[0].place, 40);
     for (k, one) in found.iter().enumerate() {
-        assert!(
-            found[..k]
-                .iter()
-                .all(|other| other.place.abs_diff(one.place) >= 3)
-        );
+        let mut better = found[..k].iter();
+        assert!(better.all(|other| other.place.abs_diff(one.place) >= 3));
     }
     assert_eq!(index.places_until(60.0), 4);
 }

@@ -40,6 +40,11 @@ pub fn seen(place: &[[f64; 2]], sensor: &Pose) -> Submap {
     submap
 }
 
+/// The descriptor of a place from its middle.
+pub fn described(seed: u64) -> Descriptor {
+    describe(&seen(&place(seed), &Pose::identity()))
+}
+
 pub fn describe(submap: &Submap) -> Descriptor {
     let mut descriptor = Descriptor::default();
     Describer::new().describe(submap, &mut descriptor);

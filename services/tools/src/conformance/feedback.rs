@@ -4,14 +4,14 @@
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Masked, Message, Motion, Scan};
 
-use super::Examination;
 use crate::conformance::{
-    rule::Rule,
+    Examination,
+    report::Rule,
     session::{Pace, Session},
 };
 
 impl Examination<'_> {
-    pub(super) fn feedback(&mut self) -> Result<(), Failure> {
+    pub(crate) fn feedback(&mut self) -> Result<(), Failure> {
         if self.context.test.candidate.manifest.window.lag == 0 {
             return Ok(());
         }
@@ -32,13 +32,16 @@ impl Examination<'_> {
         let (compensates, end) = (self.compensates(), self.context.reference.end());
         let (mut session, _) = self.begin("motions", Pace::Hold, u64::MAX)?;
         session.findings.checked(Rule::WaitsForMotion);
-        let (demands, window) = (session.demands(), session.harness.rig.manifest().window);
+        let (limit, window) = (
+            session.arguments().patience_s,
+            session.harness.rig.manifest().window,
+        );
         let (lag, scans) = (window.lag as u64, (window.scans as u64).min(end));
         (0..scans).try_for_each(|seq| session.send_inputs(seq))?;
         for motion in 0..scans.saturating_sub(lag) {
             session.feed(&[Motion::TOPIC], motion)?;
             let answered = motion + lag;
-            let waited = session.wait(demands.item_timeout, |session| session.has(answered))?;
+            let waited = session.wait(limit, |session| session.has(answered))?;
             session.findings.require(Rule::WaitsForMotion, waited.is_done(), || {
                 format!("it has the motion of item {motion} from `motion`, and sends nothing about item {answered}: it waits for more than the motion {lag} items before")
             });
@@ -69,7 +72,7 @@ impl Examination<'_> {
         let first = (newest + 1).saturating_sub(window.look_back as u64);
         let last = last.min(reference.topic(Scan::TOPIC).len() as u64 - 2);
         (first..=last).try_for_each(|seq| session.send_inputs(seq))?;
-        let limit = session.demands().item_timeout;
+        let limit = session.arguments().patience_s;
         let waited = session.wait(limit, |session| session.has(last))?;
         session.findings.require(Rule::WaitsForMotion, waited.is_done(), || {
             format!("after a restart it has the motions up to item {newest} from `pose`, and sends nothing about item {last}")

@@ -8,11 +8,11 @@
 
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{Item, StageId, flag};
-use gyre_supervise::rig::Recorded;
+use gyre_supervise::rig::{Process, Recorded};
 
-use super::Examination;
 use crate::conformance::{
-    rule::Rule,
+    Examination,
+    report::Rule,
     session::{Pace, Session, Waited},
 };
 
@@ -22,7 +22,7 @@ const UNDER_WAY: u64 = 2;
 const DOES_NOT: &str = "it does not stand by: `gyre swap` needs --cold";
 
 impl Examination<'_> {
-    pub(super) fn restart(&mut self) -> Result<(), Failure> {
+    pub(crate) fn restart(&mut self) -> Result<(), Failure> {
         let end = self.context.reference.end();
         let (mut session, _) = self.begin("restart", Pace::Window, u64::MAX)?;
         session.until = end / 3 + UNDER_WAY;
@@ -40,13 +40,13 @@ impl Examination<'_> {
         resumes(&mut session, Rule::LooksBack, when, end)
     }
 
-    pub(super) fn standing_by(&mut self) -> Result<(), Failure> {
+    pub(crate) fn standing_by(&mut self) -> Result<(), Failure> {
         let mut session = Session::open(self.context, "standing-by", &mut self.findings)?;
         let root = &session.harness.rig.manifest().root;
         let ready = root.join(format!("{}.ready", session.stage().name()));
         session.admit()?;
         session.spawn(true)?;
-        let limit = session.demands().start_timeout;
+        let limit = session.arguments().start_timeout_s;
         let waited = session.wait(limit, |session| ready.exists() || session.has_joined())?;
         let lives = session.rest()?;
         let breach = match (ready.exists(), session.has_joined()) {
@@ -66,7 +66,11 @@ impl Examination<'_> {
             session.findings.broken(Rule::StandsBy, breach);
             return Ok(());
         }
-        session.harness.end_input();
+        session
+            .harness
+            .process
+            .iter_mut()
+            .for_each(Process::end_input);
         let until = session.reference.end() / 3;
         let mut waited = session.wait(limit, |session| session.harness.has_publisher())?;
         if waited.is_done() {

@@ -5,16 +5,17 @@ use std::cell::Cell;
 
 use gyre_configuration::terminal::Failure;
 use gyre_contract::{StageId, flag};
+use gyre_supervise::rig::Process;
 
-use super::Examination;
 use crate::conformance::{
+    Examination,
+    report::Rule,
     result::result_bytes,
-    rule::Rule,
     session::{Pace, Session, Waited},
 };
 
 impl Examination<'_> {
-    pub(super) fn stream(&mut self) -> Result<bool, Failure> {
+    pub(crate) fn stream(&mut self) -> Result<bool, Failure> {
         let mut session = Session::open(self.context, "stream", &mut self.findings)?;
         let before = session.harness.rig.services();
         session.admit()?;
@@ -55,11 +56,11 @@ impl Examination<'_> {
     }
 
     /// The source: without a pose it sends the items of one window, and waits.
-    pub(super) fn window(&mut self) -> Result<(), Failure> {
+    pub(crate) fn window(&mut self) -> Result<(), Failure> {
         let end = self.context.reference.end() as usize;
         let (mut session, _) = self.begin("window", Pace::Hold, u64::MAX)?;
         let window = session.harness.rig.manifest().window.scans.min(end);
-        let limit = session.demands().item_timeout;
+        let limit = session.arguments().patience_s;
         session.wait(limit, |it| it.outputs.len() >= window)?;
         session.rest()?;
         let sent = session.outputs.len();
@@ -73,10 +74,10 @@ impl Examination<'_> {
 }
 
 impl Session<'_> {
-    pub(super) fn starts(&mut self) -> Result<bool, Failure> {
+    pub(crate) fn starts(&mut self) -> Result<bool, Failure> {
         let topic = self.output_topic();
         self.spawn(false)?;
-        let limit = self.demands().start_timeout;
+        let limit = self.arguments().start_timeout_s;
         let waited = self.wait(limit, |session| session.harness.has_publisher())?;
         let is_open = waited.is_done();
         self.findings
@@ -89,7 +90,7 @@ impl Session<'_> {
 
     /// Requires that it subscribes to its inputs, and the handshake of each.
     fn joins(&mut self) -> Result<(), Failure> {
-        let limit = self.demands().item_timeout;
+        let limit = self.arguments().patience_s;
         self.findings.checked(Rule::AsksForHistory);
         self.wait(limit, |session| session.not_read().is_empty())?;
         for topic in self.not_read() {
@@ -102,7 +103,7 @@ impl Session<'_> {
 
     /// Requires that it notifies the publisher of each topic that it has subscribed to.
     fn asks_for_history(&mut self) -> Result<(), Failure> {
-        let limit = self.demands().item_timeout;
+        let limit = self.arguments().patience_s;
         self.wait(limit, |session| session.not_notified().is_empty())?;
         for topic in self.not_notified() {
             let sentence = format!(
@@ -159,7 +160,7 @@ impl Session<'_> {
         let sizes = gyre_contract::topic(topic).map(|it| (it.sizes)(&rig.manifest().window));
         let wanted = sizes.map_or(0, |it| it.history).min(self.outputs.len());
         let (late, received) = (rig.tap(topic)?, Cell::new(0));
-        self.wait(self.demands().item_timeout, |_| {
+        self.wait(self.arguments().patience_s, |_| {
             while late.receive().is_ok_and(|message| message.is_some()) {
                 received.set(received.get() + 1);
             }
@@ -172,9 +173,9 @@ impl Session<'_> {
         Ok(())
     }
 
-    pub(super) fn stops(&mut self, when: &str) -> Result<(), Failure> {
-        let limit = self.demands().stop_timeout;
-        self.harness.terminate();
+    pub(crate) fn stops(&mut self, when: &str) -> Result<(), Failure> {
+        let limit = self.arguments().stop_timeout_s;
+        self.harness.process.iter().for_each(Process::terminate);
         self.pace = Pace::Hold;
         let breach = match self.ended_within(limit)? {
             None => Some(format!(
