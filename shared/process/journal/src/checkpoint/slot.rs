@@ -1,16 +1,17 @@
 //! The content of the slots of a checkpoint: a checksum, then a structure in the format of
 //! postcard, then zeros; in the slot of a keyframe the cells of its images follow.
 
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, samples::Witness};
 use gyre_matching::{Keyframe, TrackerState};
 use gyre_storage::{is_sealed, seal};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-/// Bytes of a checksum, of a state without the names of its keyframes, of a name, and of a keyframe
-/// without its cells: at most.
+/// Bytes of a checksum, of the filter of a kind of sensor, of a state without the names of its
+/// keyframes, of a name, and of a keyframe without its cells: at most.
 const CHECK: usize = 8;
-const STATE: usize = 824;
+const FILTER: usize = 259;
+const STATE: usize = 440 + FILTER * Witness::ALL.len();
 const NAME: usize = 20;
 const HEAD: usize = 104;
 const FITS: &str = "a slot has room for the longest content";
@@ -129,7 +130,7 @@ pub(super) fn decode_keyframe(slot: &[u8], expected: Name, keyframe: &mut Keyfra
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_geometry::{Twist, samples::Witness};
+    use gyre_geometry::Twist;
     use gyre_matching::{Anchor, Filter, Verdict};
     use nalgebra::{Complex, Matrix3, Matrix5, UnitComplex};
 
