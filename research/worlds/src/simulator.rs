@@ -210,6 +210,7 @@ impl Simulator {
             SampleKind::Gnss => {
                 gnss::device(&config.gnss, &config.tunnels, config.gnss_seed(), path)
             }
+            SampleKind::Heading => None,
         };
         Some(device?.records(self.span()))
     }

@@ -55,11 +55,12 @@ describe! {
     /// scan. Of a gyro: the turn from stamp to stamp (rad), counter-clockwise, and the mean rate
     /// during the sweep (rad/s), both with the bias. Of wheels: the distance ahead along the
     /// vehicle's path (m). Of Doppler: the velocity of the radar in the middle of the sweep, ahead
-    /// and to the left (m/s).
+    /// and to the left (m/s). Of an absolute heading: the heading at the stamp (rad).
     Evidence = "gyre_evidence_v1" {
         /// Number of samples or bearings that determine it; zero: it was not measured.
         samples: u64,
-        /// From the stamp of the scan before to the stamp of the scan, s; zero of a velocity.
+        /// From the stamp of the scan before to the stamp of the scan, s; zero of a velocity and
+        /// of a heading.
         interval_s: f64 [Bounds::NotNegative],
         value: [f64; 2] [Bounds::Finite],
         /// Variance of the first value, covariance, variance of the second, but for the errors that

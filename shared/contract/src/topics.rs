@@ -70,7 +70,7 @@ macro_rules! topics {
 }
 
 topics! {
-    /// A polar scan as measured, with samples of gyro and wheels. Payload: the image as decoded,
+    /// A polar scan as measured, with samples of other sensors. Payload: the image as decoded,
     /// then the samples.
     Scan = "scan" {
         ScanHeader, ByteBlock, by Sender::Stage(&[StageId::RadarReplay]), for ["masking"], Stream,
@@ -100,7 +100,7 @@ topics! {
             false => sizes,
         }
     }
-    /// Masked rasters and sparse points, and what gyro, wheels and Doppler have measured. Payload:
+    /// Masked rasters and sparse points, and what other sensors have measured. Payload:
     /// one raster if the mask takes one scan, or two (this scan and the previous one, both masked
     /// for this pair) if it takes both; then the scan's points. Each part starts at a whole block.
     Masked = "masked" {

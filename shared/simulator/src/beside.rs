@@ -3,6 +3,7 @@
 
 pub mod gnss;
 pub mod gyro;
+pub mod heading;
 #[cfg(test)]
 mod tests;
 pub mod wheels;
@@ -31,7 +32,7 @@ pub struct Kind {
     pub lacks: &'static str,
 }
 
-pub const KINDS: [Kind; 3] = [
+pub const KINDS: [Kind; 4] = [
     Kind {
         of: SampleKind::Gyro,
         file: "imu.csv",
@@ -53,6 +54,13 @@ pub const KINDS: [Kind; 3] = [
         header: "stamp_ns,latitude_deg,longitude_deg,sigma_m",
         columns: &[0, 1, 3],
         lacks: "no receiver: give it a rate",
+    },
+    Kind {
+        of: SampleKind::Heading,
+        file: "heading.csv",
+        header: "stamp_ns,yaw_rad",
+        columns: &[0],
+        lacks: "no headings: give them a rate",
     },
 ];
 

@@ -10,6 +10,7 @@ use crate::{
         Device,
         gnss::{self, SimulatedGnssConfig},
         gyro::{self, SimulatedGyroConfig},
+        heading::{self, SimulatedHeadingConfig},
         wheels::{self, SimulatedWheelsConfig},
     },
     error::SimulatorError,
@@ -68,6 +69,9 @@ pub struct SimulationConfig {
     /// The GNSS receiver beside the radar. Default: none.
     #[serde(skip_serializing_if = "is_default")]
     pub gnss: SimulatedGnssConfig,
+    /// The absolute headings beside the radar. Default: none.
+    #[serde(skip_serializing_if = "is_default")]
+    pub heading: SimulatedHeadingConfig,
     /// The format of the dataset.
     pub output: OutputConfig,
 }
@@ -89,6 +93,7 @@ impl Default for SimulationConfig {
             gyro: SimulatedGyroConfig::default(),
             wheels: SimulatedWheelsConfig::default(),
             gnss: SimulatedGnssConfig::default(),
+            heading: SimulatedHeadingConfig::default(),
             output: OutputConfig::default(),
         }
     }
@@ -98,6 +103,7 @@ impl SimulationConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
         let (drive, sensor) = (&self.drive, &self.sensor);
         let (gyro, wheels, gnss) = (&self.gyro, &self.wheels, &self.gnss);
+        let heading = &self.heading;
         let scans = self.scans.unwrap_or(1) as f64;
         let [blind_s, sees_s] = self.blind_s.unwrap_or_default();
         let [begins_m, length_m] = self.tunnel_m.unwrap_or([0.0, 10.0]);
@@ -132,6 +138,10 @@ impl SimulationConfig {
             ("wheels.rate_hz", wheels.rate_hz, 0.0, 1000.0),
             ("wheels.delay_s", wheels.delay_s, -1e6, 1e6),
             ("gnss.rate_hz", gnss.rate_hz, 0.0, 100.0),
+            ("heading.rate_hz", heading.rate_hz, 0.0, 1000.0),
+            ("heading.noise_deg", heading.noise_deg, 0.0, 90.0),
+            ("heading.offset_deg", heading.offset_deg, -360.0, 360.0),
+            ("heading.delay_s", heading.delay_s, -1e6, 1e6),
         ] {
             if !(least..=most).contains(&value) {
                 let expected = format!("between {least} and {most}");
@@ -151,6 +161,7 @@ impl SimulationConfig {
             SampleKind::Gyro => gyro::device(&self.gyro, self.seed, path),
             SampleKind::Wheels => wheels::device(&self.wheels, self.seed, path),
             SampleKind::Gnss => gnss::device(&self.gnss, self.seed, path),
+            SampleKind::Heading => heading::device(&self.heading, self.seed, path),
         }
     }
 

@@ -25,7 +25,7 @@ fn read(of: SampleKind, name: &str, text: &str) -> Result<SampleLog, LogError> {
 }
 
 fn kind(section: &str) -> SampleKind {
-    let mut kinds = [Gyro, Wheels, Gnss].into_iter();
+    let mut kinds = SampleKind::ALL.into_iter();
     kinds.find(|of| of.section() == section).unwrap()
 }
 
@@ -69,6 +69,11 @@ fn tables_are_read_by_their_headers_or_by_their_number_of_columns() {
         "wheels wheels.csv|50|2.5,0||stamp_ns,speed_km_h|50,9.0",
         "wheels wheels.csv|50|2.5,0||# stamp_ns, vehicle speed [km/h]|50,9.0",
         "wheels wheels.csv|50|9,0|m/s is assumed|stamp_ns;velocity|50;9.0",
+        // Clockwise from north, and counter-clockwise from east.
+        "heading heading.csv|100|0.7853981634||stamp_ns,heading_deg|0,359.5|50,1|100,45",
+        "heading heading.csv|50000|-3.1415926536||timestamp_us;Heading [deg]|50;270",
+        "heading heading.csv|50|-2.5,0||stamp_ns,roll_rad,yaw_rad|0,7,3.1|50,7,-2.5",
+        "heading heading.csv|50|1.5707963268|1 samples have no headings|stamp_ns,yaw_deg|0,|50,90",
         "gnss gnss.csv|1760456486551626000|0,11.134,0,0||stamp_ns,latitude_deg,longitude_deg|1760456485551626000,55.9,-3.2|1760456486551626000,55.9001,-3.2",
         "gnss gnss.csv|1760456486551626000|0,11.134,0,0.3||lon;lat;timestamp;sigma_m|-3.2;55.9;1760456485551626;0.3|-3.2;55.9001;1760456486551626;0.3",
         "gnss gps/gps.csv|1760456486551626000|0,11.134,110,3.5355339059||timestamp,num_satellites,latitude,longitude,altitude,latitude_sigma,longitude_sigma,altitude_sigma,northing,easting,down,utm_zone|1760456485551626,8,55.9,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U|1760456486551626,8,55.9001,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U",

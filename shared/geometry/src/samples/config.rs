@@ -7,7 +7,8 @@ use crate::{
     bounds::{DELAY, GAP, NOISE, SCALE, SHARE, SettingError, WAIT},
     check_bounds,
     samples::{
-        DopplerConfig, Evidence, Sample, SampleKind, WheelsConfig, Witness, integral::Integrator,
+        DopplerConfig, Evidence, HeadingConfig, Sample, SampleKind, WheelsConfig, Witness,
+        integral::Integrator,
     },
 };
 
@@ -170,6 +171,8 @@ pub struct SensorConfigs {
     pub wheels: WheelsConfig,
     /// The velocity by the Doppler shift of single scans.
     pub doppler: DopplerConfig,
+    /// The heading itself, by two antennas or a compass.
+    pub heading: HeadingConfig,
 }
 
 impl SensorConfigs {
@@ -179,6 +182,7 @@ impl SensorConfigs {
             Witness::Gyro => Some(&self.gyro),
             Witness::Wheels => Some(&self.wheels),
             Witness::Doppler => None,
+            Witness::Heading => Some(&self.heading),
         }
     }
 

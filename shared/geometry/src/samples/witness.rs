@@ -1,6 +1,8 @@
 //! The kinds of sensors beside the radar, and of their samples: the measured part of a motion, and
 //! the names in outputs.
 
+use std::f64::consts::TAU;
+
 use crate::samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample};
 
 crate::named! {
@@ -11,6 +13,7 @@ crate::named! {
         Gyro = "gyro",
         Wheels = "wheels",
         Doppler = "doppler",
+        Heading = "heading",
     }
 }
 
@@ -108,6 +111,23 @@ static TABLE: [Row; Witness::ALL.len()] = [
             ("its deviation", "/doppler/scale_sigma", Some(4)),
         ],
     },
+    Row {
+        measures: Measures::Heading,
+        samples: Some(SampleKind::Heading),
+        word: "heading",
+        refused: ["refused", "refused"],
+        keys: ["heading_used", "heading_refused"],
+        metric: [
+            "headings",
+            "Absolute headings: used, or refused since the radar contradicts.",
+        ],
+        figures: &[
+            ("absolute headings", "/heading/motions", Some(0)),
+            ("absolute headings refused", "/heading/refused", None),
+            ("their offset, rad", "/heading/offset_rad", Some(4)),
+            ("its deviation, rad", "/heading/offset_sigma_rad", Some(5)),
+        ],
+    },
 ];
 
 impl Witness {
@@ -136,6 +156,8 @@ pub enum SampleKind {
     /// axes (m), not above zero where the log has none; 1 if the receiver does not state whether it
     /// had a fix. Fixes travel with no scan.
     Gnss = 3,
+    /// Heading of the vehicle (rad), counter-clockwise from east.
+    Heading = 4,
 }
 
 /// The properties of a kind of samples.
@@ -151,13 +173,14 @@ struct SampleRow {
 }
 
 impl SampleKind {
-    pub const ALL: [Self; 3] = [Self::Gyro, Self::Wheels, Self::Gnss];
+    pub const ALL: [Self; 4] = [Self::Gyro, Self::Wheels, Self::Gnss, Self::Heading];
 
     const fn row(self) -> SampleRow {
         let (section, counts, bounded, rate): (_, &[usize], _, _) = match self {
             Self::Gyro => ("gyro", &[3, 6], Some((3, MAX_RATE_RADPS)), 2),
             Self::Wheels => ("wheels", &[1], Some((1, MAX_SPEED_MPS)), 0),
             Self::Gnss => ("gnss", &[], None, 0),
+            Self::Heading => ("heading", &[1], Some((1, TAU)), 0),
         };
         SampleRow {
             section,

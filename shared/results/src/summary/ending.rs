@@ -212,7 +212,7 @@ look at     gyre report out/radiate --open; all figures:
 
     #[test]
     fn motions_without_a_match_and_sensors_that_are_wrong_or_unused_are_a_problem() {
-        let problem = |unsure, doubted, slips, scale, delay_s| {
+        let problem_of = |unsure, doubted, slips, scale, delay_s, headings| {
             let mut gyro = SensorCount {
                 motions: 400,
                 doubted,
@@ -223,6 +223,11 @@ look at     gyre report out/radiate --open; all figures:
             let wheels = SensorCount {
                 motions: 400,
                 refused: slips,
+                ..SensorCount::default()
+            };
+            let heading = SensorCount {
+                motions: 400,
+                refused: headings,
                 ..SensorCount::default()
             };
             let gyro = (scale > 0.0).then_some(gyro);
@@ -237,7 +242,8 @@ look at     gyre report out/radiate --open; all figures:
                 sensors: SensorCounts(Witness::ALL.map(|kind| match kind {
                     Witness::Gyro => gyro,
                     Witness::Wheels => Some(wheels),
-                    _ => None,
+                    Witness::Heading => Some(heading),
+                    Witness::Doppler => None,
                 })),
                 ..Counts::default()
             };
@@ -246,6 +252,12 @@ look at     gyre report out/radiate --open; all figures:
             assert_eq!(summary.in_brief().contains("\nproblem "), problem.is_some());
             problem.unwrap_or_default()
         };
+        let problem = |unsure, doubted, slips, scale, delay_s| {
+            problem_of(unsure, doubted, slips, scale, delay_s, 40)
+        };
+        let mirrored = problem_of(0, 0, 0, 1.0, 0.0, 41);
+        let expected = "the heading contradicts the radar: 41 of its 400 headings were refused";
+        assert!(mirrored.contains(expected), "{mirrored}");
         assert_eq!(problem(93, 40, 200, 1.03, -0.11), "");
         assert!(problem(94, 0, 0, 1.0, 0.0).contains(HARDLY_MEASURED));
         assert!(problem(0, 41, 0, 1.0, 0.0).contains("41 of its 400 turns"));

@@ -1,6 +1,11 @@
 //! Each kind of sensor: its errors, its faults, its log.
 
-use gyre_geometry::samples::{Geographic, LocalPlane};
+use std::f64::consts::PI;
+
+use gyre_geometry::{
+    samples::{Geographic, LocalPlane},
+    wrap_angle,
+};
 use nalgebra::{Vector2, Vector3};
 
 use super::{gyro::*, *};
@@ -9,7 +14,7 @@ use crate::{Simulator, stream::Stream};
 const RATE_HZ: f64 = 100.0;
 
 /// The drive of a configuration, and the records of all kinds.
-fn simulated(settings: &str) -> (Simulator, [Option<Vec<Record>>; 3]) {
+fn simulated(settings: &str) -> (Simulator, [Option<Vec<Record>>; 4]) {
     let config: crate::SimulationConfig = toml::from_str(settings).unwrap();
     let simulator = Simulator::new(&config).unwrap();
     let records = KINDS.map(|kind| simulator.records(&kind));
@@ -22,8 +27,9 @@ fn deviation(values: &[f64]) -> f64 {
 
 #[test]
 fn each_kind_measures_the_drive_and_a_drive_without_it_has_no_log() {
-    let (simulator, [gyro, wheels, gnss]) = simulated(
-        "scans = 1600\ngyro.profile = 'exact'\nwheels.rate_hz = 50.0\ngnss.rate_hz = 5.0",
+    let (simulator, [gyro, wheels, gnss, heading]) = simulated(
+        "scans = 1600\ngyro.profile = 'exact'\nwheels.rate_hz = 50.0\ngnss.rate_hz = 5.0\n\
+        heading = {rate_hz = 10.0, noise_deg = 0.3, offset_deg = 170.0, delay_s = 0.5}",
     );
     let (gyro, wheels, gnss) = (gyro.unwrap(), wheels.unwrap(), gnss.unwrap());
     assert_eq!(
@@ -67,7 +73,18 @@ fn each_kind_measures_the_drive_and_a_drive_without_it_has_no_log() {
     let stated_m2 = 2.0 * gnss[0].1[3].powi(2);
     assert!((0.3..3.0).contains(&(mean_m2 / stated_m2)), "{mean_m2}");
 
-    assert_eq!(simulated("scans = 2").1, [None, None, None]);
+    let off_rad = |(stamp_ns, [heading_rad, ..]): &Record| {
+        let truth = pose((stamp_ns - simulator.span().0) as f64 * 1e-9 - 0.5).rotation;
+        wrap_angle(heading_rad - truth.angle() - 170_f64.to_radians())
+    };
+    let heading = heading.unwrap();
+    let errors: Vec<f64> = heading.iter().map(off_rad).collect();
+    assert_eq!(errors.len(), 4000);
+    let ratio = deviation(&errors) / 0.3_f64.to_radians();
+    assert!((0.95..1.05).contains(&ratio), "{ratio}");
+    assert!(heading.iter().all(|it| it.1[0].abs() <= PI));
+
+    assert_eq!(simulated("scans = 2").1, [const { None }; 4]);
 }
 
 #[test]
@@ -116,7 +133,8 @@ fn each_error_of_a_gyro_is_as_large_as_its_figure() {
 #[test]
 fn the_numbers_of_each_log_are_those_of_the_samples_which_more_scans_extend() {
     const SETTINGS: &str = "gyro = {profile = 'asm330lhh', faults = true}\n\
-        wheels = {rate_hz = 50.0, faults = true}\ngnss = {rate_hz = 5.0, faults = true}";
+        wheels = {rate_hz = 50.0, faults = true}\ngnss = {rate_hz = 5.0, faults = true}\n\
+        heading.rate_hz = 10.0";
     let records = |scans: usize| simulated(&format!("scans = {scans}\n{SETTINGS}")).1;
     for ((kind, few), more) in KINDS.iter().zip(records(20)).zip(records(30)) {
         let few = few.unwrap();
@@ -135,7 +153,7 @@ fn the_numbers_of_each_log_are_those_of_the_samples_which_more_scans_extend() {
     // Each value is in the column that the first row names: the altitude of a fix is in none.
     let record = (7, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     let row = |kind: Kind| kind.csv(&[record]).lines().nth(1).unwrap().to_owned();
-    assert_eq!(KINDS.map(row), ["7,1,2,3,4,5,6", "7,1", "7,1,2,4"]);
+    assert_eq!(KINDS.map(row), ["7,1,2,3,4,5,6", "7,1", "7,1,2,4", "7,1"]);
 }
 
 #[test]
@@ -144,7 +162,7 @@ fn with_faults_hosts_stall_wheels_slip_receivers_are_in_holes_and_samples_are_lo
         let (simulator, records) = simulated(&format!(
             "scans = 400\ngyro = {{profile = 'exact', delay_s = 1.5, faults = {faults}}}\n\
             wheels = {{rate_hz = 50.0, delay_s = -0.5, faults = {faults}}}\n\
-            gnss = {{rate_hz = 25.0, faults = {faults}}}"
+            gnss = {{rate_hz = 25.0, faults = {faults}}}\nheading.rate_hz = 25.0"
         ));
         let start_ns = simulator.span().0;
         let since = |(stamp_ns, values)| ((stamp_ns - start_ns) as f64 * 1e-9, values);

@@ -1,4 +1,4 @@
-use gyre_contract::outcome;
+use gyre_contract::{Witness, outcome};
 
 use super::*;
 
@@ -13,7 +13,7 @@ const CLOCK: PlayedClock = PlayedClock {
 
 fn others() -> Others {
     Others {
-        used: [true, true, false],
+        used: Witness::ALL.map(|kind| matches!(kind, Witness::Gyro | Witness::Wheels)),
         are_weighed: true,
     }
 }

@@ -1,12 +1,19 @@
 //! The kinds of logs, one row for each: the places of the log, the readers of its columns, the
 //! plausible values, and the words.
 
-use gyre_geometry::samples::{Sample, SampleKind};
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use gyre_geometry::{
+    samples::{Sample, SampleKind},
+    wrap_angle,
+};
 
 use super::{
-    columns::Columns,
+    columns::{Columns, Read},
     faults::{FaultWords, OF_FIXES, OF_SAMPLES},
-    names::{counts, fix, positions, rates, speed, turning, unnamed_positions, unnamed_rates},
+    names::{
+        counts, fix, missing, positions, rates, speed, turning, unnamed_positions, unnamed_rates,
+    },
 };
 use crate::header::Header;
 
@@ -56,6 +63,7 @@ impl Kind {
             SampleKind::Gyro => &GYRO,
             SampleKind::Wheels => &WHEELS,
             SampleKind::Gnss => &GNSS,
+            SampleKind::Heading => &HEADING,
         }
     }
 }
@@ -168,3 +176,38 @@ const GNSS: Kind = Kind {
     changes: None,
     ..GYRO
 };
+
+const HEADING: Kind = Kind {
+    of: SampleKind::Heading,
+    title: "Heading",
+    one: "absolute headings",
+    name: "receiver of headings",
+    uses: "heading.kind = \"auto\"",
+    places: &["heading.csv"],
+    by_names: heading,
+    sample: |stamp_ns, values| Sample::of(SampleKind::Heading, stamp_ns, values),
+    most: TAU,
+    beyond: "are beyond a whole turn: if they are in degrees, name the column so, as heading_deg or yaw_deg",
+    value_words: "headings",
+    absurd: "headings beyond a whole turn",
+    // As for the rates of a gyro, rad/s.
+    changes: Some((|from, to| wrap_angle(to.values[0] - from.values[0]), 10.0)),
+    ..WHEELS
+};
+
+/// The columns of headings: clockwise from true north, as receivers state them, or
+/// counter-clockwise from east.
+fn heading(header: &Header) -> Result<Columns, String> {
+    let forms: [(_, fn(f64) -> f64); 3] = [
+        ("heading_deg", |deg| FRAC_PI_2 - deg.to_radians()),
+        ("yaw_rad", |rad| rad),
+        ("yaw_deg", f64::to_radians),
+    ];
+    let remedy = "the first row must name the columns, as in `stamp_ns,heading_deg` (clockwise from north), or yaw_rad, yaw_deg (counter-clockwise from east)";
+    let missing = |what| missing(header, what, remedy);
+    let mut forms = forms.into_iter();
+    let found = forms.find_map(|(name, of)| Some((header.find(name)?, of)));
+    let (column, of) = found.ok_or_else(|| missing("heading"))?;
+    let stamp = header.stamp().ok_or_else(|| missing("stamps"))?;
+    Ok(Columns::of(stamp).with(0, [column], Read::OrBlank(of)))
+}

@@ -2,5 +2,6 @@
 
 mod covariances;
 mod examples;
+mod heading;
 mod sample_faults;
 mod standing_pair;

@@ -1,16 +1,17 @@
 //! The content of the slots of a checkpoint: a checksum, then a structure in the format of
 //! postcard, then zeros; in the slot of a keyframe the cells of its images follow.
 
-use gyre_geometry::Pose;
+use gyre_geometry::{Pose, samples::Witness};
 use gyre_matching::{Keyframe, TrackerState};
 use gyre_storage::{is_sealed, seal};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-/// Bytes of a checksum, of a state without the names of its keyframes, of a name, and of a keyframe
-/// without its cells: at most.
+/// Bytes of a checksum, of the filter of a kind of sensor, of a state without the names of its
+/// keyframes, of a name, and of a keyframe without its cells: at most.
 const CHECK: usize = 8;
-const STATE: usize = 824;
+const FILTER: usize = 259;
+const STATE: usize = 440 + FILTER * Witness::ALL.len();
 const NAME: usize = 20;
 const HEAD: usize = 104;
 const FITS: &str = "a slot has room for the longest content";
@@ -164,7 +165,7 @@ mod tests {
             unmatched: u32::MAX,
             along_walls: u32::MAX,
             sliding: u32::MAX,
-            filters: [Some(filter); 3],
+            filters: [Some(filter); Witness::ALL.len()],
             ..TrackerState::default()
         };
         state.since_match.covariance = Matrix3::from_element(-0.3);

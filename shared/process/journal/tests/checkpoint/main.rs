@@ -329,7 +329,7 @@ fn the_file_stops_growing() {
     assert_eq!(first, length(200..330));
     let slots = (config().keyframes + 2 * WINDOW + 32 + 8) as u64;
     let keyframe = self::refinement().keyframe_cells() as u64 + 80;
-    // The states of the longest window, each of less than a kilobyte.
-    let states = (2 * 66 + 32 + 8) * 1024;
+    // The states of the longest window, each of less than two kilobytes.
+    let states = (2 * 66 + 32 + 8) * 2048;
     assert!(first < states + slots * keyframe, "{first} bytes");
 }
