@@ -322,7 +322,7 @@ impl Refiner {
         }
         Accepted {
             outcome,
-            covariance: self.update_heading(scan, &registered),
+            covariance: self.update_heading(scan, &registered, best.guess),
             pose: registered,
             guess: best.guess,
             ahead_m: found.ahead_m,

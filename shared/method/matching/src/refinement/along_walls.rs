@@ -17,6 +17,9 @@ use super::{
     uncertainty::{self, Uncertainty},
 };
 
+/// The least motion whose curvature counts, m.
+const MIN_STEP_M: f64 = 0.5;
+
 pub(super) struct Match {
     pub registered: UncertainMotion,
     pub undetermined: Option<UnitVector2<f64>>,
@@ -187,7 +190,16 @@ impl Refiner {
         };
         let ahead = self.state.pose.rotation.inverse() * along.into_inner();
         let variance = uncertainty.of_predicted_place(ahead, sliding);
-        self.placed(registered, along, variance, self.drift_share())
+        let drift_share = self.drift_share();
+        let mut placed = self.placed(registered, along, variance, drift_share);
+        if scan.step.distance.is_none() {
+            // Walls that bend turn a scan whose place along them is wrong.
+            let motion = self.state.pose.inv_mul(&registered.motion);
+            let step_m = motion.translation.vector.norm().max(MIN_STEP_M);
+            let per_m = motion.rotation.angle() / step_m;
+            placed.covariance[(2, 2)] += per_m.powi(2) * variance / drift_share;
+        }
+        placed
     }
 
     pub(super) fn drift_share(&self) -> f64 {

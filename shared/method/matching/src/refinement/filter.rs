@@ -391,14 +391,14 @@ impl Filter {
         self.correction = -self.drift - (change - predicted.in_map);
     }
 
-    /// Takes the predicted coordinate of a scan that is registered in the other coordinates alone:
-    /// the map follows the sensor.
-    pub(super) fn follow(&mut self, predicted: &Predicted) {
-        self.reset_to(&Seen {
-            change: predicted.in_map,
-            jitter: predicted.noise,
-            drift: 0.0,
-        });
+    /// Takes the predicted coordinate of a scan whose registered coordinate is not determined by
+    /// anything that stands still: the map follows the sensor. The tracker's pose has moved by
+    /// `change`, with this variance of its jitter.
+    pub(super) fn follow(&mut self, change: f64, jitter: f64, predicted: &Predicted) {
+        self.take_prediction(change, predicted);
+        self.tie(DRIFT, VALUE);
+        self.covariance[(DRIFT, DRIFT)] += jitter;
+        self.drift = -self.correction;
     }
 
     /// Takes a coordinate that neither the sensor nor the map has measured: one that is predicted

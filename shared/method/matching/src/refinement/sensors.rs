@@ -5,15 +5,16 @@ use gyre_geometry::{
     samples::{AllEvidence, Evidence, Measures, Witness},
     wrap_angle,
 };
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    Accepted, Filter, Outcome, Refiner, SinceMatch, Witnessed,
+    Accepted, Filter, InitialGuess, Outcome, Refiner, SinceMatch, Witnessed,
     candidates::{Candidate, Scan},
     config::JITTER_DEG,
     filter::{GATE, Seen, Verdict},
     predicted::{PredictedDistance, PredictedTurn, seen_distance},
     tracker::Step,
+    uncertainty::with_variance,
 };
 
 /// Drift of the radar's heading, rad/√m: 0.03 degrees per square root of 100 m. The trajectories
@@ -256,8 +257,10 @@ impl Refiner {
         &mut self,
         scan: &Scan<'_>,
         registered: &UncertainMotion,
+        guess: InitialGuess,
     ) -> Matrix3<f64> {
         let mut covariance = registered.covariance;
+        let is_place_guessed = guess == InitialGuess::AlongWalls && scan.step.distance.is_none();
         let (near_rad, drift_share) = (scan.step.turn.map(|it| it.yaw_rad()), self.drift_share());
         let seen = self.seen(Witness::Gyro, registered, near_rad.unwrap_or_default());
         if scan.step.turn.is_none() {
@@ -267,6 +270,12 @@ impl Refiner {
             return covariance;
         };
         if let Some(turn) = scan.step.turn {
+            if is_place_guessed {
+                // Walls that bend turn a scan whose place along them is wrong.
+                filter.follow(seen.change, seen.jitter, &turn.of);
+                let variance_rad2 = turn.variance_rad2() / drift_share;
+                return with_variance(&covariance, Vector3::z(), variance_rad2);
+            }
             let taken_back_rad2 = filter.update(&seen, &turn.of);
             if filter.is_plausible(&self.errors[GYRO]) {
                 covariance = turn.covariance(&covariance, drift_share);
@@ -357,7 +366,7 @@ impl Refiner {
             match filter.verdict {
                 Verdict::Refused if agrees => filter.verdict = Verdict::Agrees,
                 Verdict::Refused => {}
-                _ => filter.follow(&predicted),
+                _ => filter.follow(predicted.in_map, predicted.noise, &predicted),
             }
         }
         self.state.since_match.distance_m += self.driven_m(scan);
