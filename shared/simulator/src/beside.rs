@@ -28,7 +28,7 @@ pub struct Kind {
     pub header: &'static str,
     /// The value of a sample in each column after the stamp.
     columns: &'static [usize],
-    /// What a simulation without it lacks, in words.
+    /// The words for its absence from a simulation.
     pub lacks: &'static str,
 }
 

@@ -42,7 +42,7 @@ pub struct Row {
     pub keys: [&'static str; 2],
     /// The metric of its measurements: name and description.
     pub metric: [&'static str; 2],
-    /// The figures of a run: name, place in `summary.json`, and decimals; `None`: a count of what is
+    /// The figures of a run: name, place in `summary.json`, decimals; `None`: a count of what is
     /// unusual.
     pub figures: &'static [(&'static str, &'static str, Option<usize>)],
 }

@@ -113,8 +113,8 @@ fn content(
     report.figure(section, times.figures(file, figures));
 }
 
-/// What the logs of a kind contain, by the period of their samples, s; that of other kinds is their
-/// times alone.
+/// The contents of the logs of a kind, by the period of their samples, s; those of other kinds are
+/// their times alone.
 const CONTENTS: [(SampleKind, fn(&SampleLog, f64) -> Content); 3] = [
     (SampleKind::Gyro, turns),
     (SampleKind::Wheels, |log, _| path(log)),

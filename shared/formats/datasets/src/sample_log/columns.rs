@@ -42,7 +42,7 @@ pub(crate) enum Read {
     NumberIfAny(f64),
     /// A number with the sign in this column.
     Signed(usize, &'static Sign),
-    /// What this makes of a number; a field is blank if the sensor does not know the value.
+    /// The value of this function of a number; a field is blank if the sensor does not know it.
     OrBlank(fn(f64) -> f64),
     /// 1 for this text, 0 for any other.
     Is(&'static str),
