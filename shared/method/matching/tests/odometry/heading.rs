@@ -22,8 +22,8 @@ struct Driven {
     refused: usize,
 }
 
-/// Drives around a block with a coarse radar, and with a log of these headings, rad, of antennas that
-/// are mounted across the vehicle; `None`: without a log.
+/// Drives around a block with a coarse radar, and with a log of these headings, rad, of antennas
+/// that are mounted across the vehicle; `None`: without a log.
 fn drive(scans: usize, logged: Option<fn(f64) -> f64>) -> Driven {
     let mut simulation = SimulationConfig {
         scans: Some(scans),
