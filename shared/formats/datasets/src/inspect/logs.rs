@@ -113,9 +113,12 @@ fn content(
     report.figure(section, times.figures(file, figures));
 }
 
+/// Describes a log, by the period of its samples, s.
+type Describe = fn(&SampleLog, f64) -> Content;
+
 /// The content of the logs of a kind, by the period of their samples, s; of other kinds it is their
 /// times alone.
-const CONTENTS: [(SampleKind, fn(&SampleLog, f64) -> Content); 3] = [
+const CONTENTS: [(SampleKind, Describe); 3] = [
     (SampleKind::Gyro, turns),
     (SampleKind::Wheels, |log, _| path(log)),
     (SampleKind::Gnss, |log, _| places(log)),

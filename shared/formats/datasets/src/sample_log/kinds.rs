@@ -54,7 +54,7 @@ pub(crate) struct Kind {
     pub unit: &'static str,
     /// The change from one sample to another that cannot be faster than a vehicle, and by how much
     /// it can be in a second.
-    pub changes: Option<(fn(&Sample, &Sample) -> f64, f64)>,
+    pub changes: Option<(Change, f64)>,
 }
 
 impl Kind {
@@ -195,10 +195,13 @@ const HEADING: Kind = Kind {
     ..WHEELS
 };
 
+/// The heading of a number, rad.
+type Angle = fn(f64) -> f64;
+
 /// The columns of headings: clockwise from true north, as receivers state them, or
 /// counter-clockwise from east.
 fn heading(header: &Header) -> Result<Columns, String> {
-    let forms: [(_, fn(f64) -> f64); 3] = [
+    let forms: [(&str, Angle); 3] = [
         ("heading_deg", |deg| FRAC_PI_2 - deg.to_radians()),
         ("yaw_rad", |rad| rad),
         ("yaw_deg", f64::to_radians),
