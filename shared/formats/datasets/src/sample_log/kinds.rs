@@ -17,6 +17,9 @@ use super::{
 };
 use crate::header::Header;
 
+/// The change from one sample to another.
+pub(crate) type Change = fn(&Sample, &Sample) -> f64;
+
 #[derive(Clone, Copy)]
 pub(crate) struct Kind {
     pub of: SampleKind,
