@@ -1,6 +1,8 @@
 //! The fixes of a live GNSS receiver: messages of `gnss` are appended to `journal/gnss.csv`, from
 //! where the trajectory and the results have them.
 
+use std::mem;
+
 use gyre_contract::{Gnss, GnssHeader};
 use gyre_datasets::SampleLog;
 use gyre_geometry::samples::GnssConfig;
@@ -32,6 +34,8 @@ pub(super) struct LiveFixes {
     next: u64,
     file: File,
     end: u64,
+    /// Lost messages that no row of the log counts yet.
+    lost: u64,
     sync: GroupSync,
     taken: Numbers<2>,
     received: ReceivedFixes,
@@ -68,6 +72,7 @@ impl LiveFixes {
             next,
             sync: GroupSync::start(&file)?,
             end: file.length()?,
+            lost: 0,
             file,
             taken: Numbers::open(manifest, TAKEN)?,
             received: ReceivedFixes::read(&path).map_err(RunError::input)?,
@@ -97,7 +102,7 @@ impl LiveFixes {
         if self.has_ended {
             return Ok(());
         }
-        let (mut rows, mut lost) = (String::new(), 0);
+        let mut rows = String::new();
         while let Some(message) = self.port.receive()? {
             let message = message.header();
             // A trajectory that is restarted also receives messages that it has logged before.
@@ -105,16 +110,19 @@ impl LiveFixes {
                 continue;
             };
             self.next = message.item.seq.saturating_add(1);
-            lost = missing.saturating_add(message.lost).saturating_add(lost);
+            let lost = missing.saturating_add(message.lost);
+            self.lost = self.lost.saturating_add(lost);
             match self.end < MAX_LOG {
                 true => rows += &row(message),
-                false => lost = lost.saturating_add(1),
+                false => self.lost = self.lost.saturating_add(1),
             }
         }
-        lost = sent.saturating_sub(self.next).saturating_add(lost);
+        let unsent = sent.saturating_sub(self.next);
+        self.lost = self.lost.saturating_add(unsent);
         self.next = self.next.max(sent);
-        if lost > 0 {
-            rows += &format!("lost,{lost}\n");
+        // A full log gets one row of them, at its end.
+        if self.lost > 0 && (self.end < MAX_LOG || sent > 0) {
+            rows += &format!("lost,{}\n", mem::take(&mut self.lost));
         }
         match rows.is_empty() {
             true => Ok(()),

@@ -17,7 +17,8 @@ use crate::{Launch, datagrams::Receiver};
 /// The file with the number of messages so far: a source that replaces a dead one continues to
 /// count.
 const SENT: &str = "source.fixes";
-/// Fixes that are published in this time: receivers send at most 20 a second.
+/// Fixes, or counts of unreadable lines, that are published in this time: receivers send at most 20
+/// a second.
 const MAX_FIXES: usize = 5000;
 const OF: Duration = Duration::from_secs(10);
 
@@ -82,10 +83,13 @@ impl Fixes {
             lost = receiver.newly_dropped() as u64;
         }
         fixes.into_iter().try_for_each(|fix| self.publish(fix))?;
+        if unreadable > 0 {
+            self.publish(GnssHeader::counts(unreadable, 0))?;
+        }
         lost += std::mem::take(&mut self.surplus);
-        match (unreadable, lost) {
-            (0, 0) => Ok(()),
-            _ => self.send(GnssHeader::counts(unreadable, lost)),
+        match lost {
+            0 => Ok(()),
+            _ => self.send(GnssHeader::counts(0, lost)),
         }
     }
 
@@ -96,7 +100,7 @@ impl Fixes {
         }
         self.count += 1;
         if self.count > MAX_FIXES {
-            self.surplus += 1;
+            self.surplus += fix.unreadable.max(1);
             return Ok(());
         }
         if self.next == 0 {
