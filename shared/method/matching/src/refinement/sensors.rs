@@ -383,13 +383,18 @@ impl Refiner {
             }
         }
         let by = scan.step.distance.map(|it| it.by);
+        let taken_back_m = scan.step.distance.map_or(0.0, |it| it.taken_back_m());
         for kind in distances() {
             let predicted = scan.step.predicted[kind as usize];
             match (&mut self.state.filters[kind as usize], predicted) {
                 (Some(filter), Some(predicted)) if by == Some(kind) => {
                     filter.take_prediction(predicted.in_map, &predicted);
                 }
-                (Some(filter), _) => filter.inflate(motion.covariance[(0, 0)]),
+                (Some(filter), _) => {
+                    // The tracker has moved by so much more than the vehicle.
+                    filter.correction -= taken_back_m;
+                    filter.inflate(motion.covariance[(0, 0)]);
+                }
                 (None, _) => {}
             }
         }
