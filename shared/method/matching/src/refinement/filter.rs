@@ -324,7 +324,7 @@ impl Filter {
             registered: 0.0,
             scale: 1.0,
             scale_sigma: 0.0,
-            bias: self.offset_rad,
+            bias: wrap_angle(self.offset_rad),
             bias_sigma: self.covariance[(OFFSET, OFFSET)].max(0.0).sqrt(),
         }
     }
