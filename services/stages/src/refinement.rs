@@ -88,8 +88,8 @@ impl RefinementStage {
         if self.next != Some(item.seq) {
             let before = item.seq.saturating_sub(1);
             let restored = self.checkpoint.restore(before, &mut self.refiner);
-            // A chain continues only with the state of gyro, wheels and Doppler, which the first
-            // chain lacks.
+            // A chain continues only with the filters of other sensors, which the first chain
+            // lacks.
             restored.or_else(|error| match starts_chain {
                 true => Ok(()),
                 false => Err(unusable(error)),

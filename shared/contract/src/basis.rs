@@ -10,9 +10,9 @@ gyre_geometry::named! {
     pub enum Basis {
         /// Two scans: there is no refinement, or the chain starts here.
         ScanToScan = "scan to scan",
-        /// The map alone: there is no gyro, no wheels and no Doppler, or they are not used.
+        /// The map alone: there are no other sensors, or they are not used.
         RadarOnly = "radar only",
-        /// The map, and a gyro, wheels or Doppler that do not contradict it.
+        /// The map, and another sensor that does not contradict it.
         RadarAndOthers = "radar and others",
         /// Walls without structure, and wheels or Doppler for the way along them.
         AlongWalls = "along walls",
@@ -104,7 +104,7 @@ impl WitnessCounts {
         (motions > 0).then(|| 100.0 * degraded as f64 / motions as f64)
     }
 
-    /// Returns the part of gyro, wheels and Doppler in words, as `gyro 98 %, 1 refused, wheels 100
+    /// Returns the part of other sensors in words, as `gyro 98 %, 1 refused, wheels 100
     /// %`; `None` without any measurement.
     pub fn in_words(&self) -> Option<String> {
         let words = Witness::ALL.into_iter().filter_map(|kind| {

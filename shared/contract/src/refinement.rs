@@ -73,7 +73,7 @@ wire! {
         pub support: f64 [Bounds::Finite],
         /// 1 while the vehicle stands, and its pose is held: the motion is zero. Otherwise 0.
         pub stationary: u64 [Bounds::Codes(NO_YES)],
-        /// Gyro, wheels and Doppler.
+        /// Gyro, wheels, Doppler and absolute heading.
         pub witnesses: [WitnessRecord; Witness::ALL.len()],
     }
 }

@@ -1,4 +1,4 @@
-//! Rates of the samples of gyro and wheels, by the scans that they come with.
+//! Rates of the samples of other sensors, by the scans that they come with.
 
 use std::collections::VecDeque;
 

@@ -11,6 +11,9 @@ use crate::{
     samples::Evidence,
 };
 
+/// Least standard deviation of the scale around 1: `dataset.doppler_s` may be of another radar.
+const OTHER_RADAR: f64 = 0.02;
+
 /// Configuration of the velocity by Doppler: section `[doppler]`. Of radars whose rising and
 /// falling chirps alternate from azimuth to azimuth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,6 +54,11 @@ impl DopplerConfig {
 
     pub fn is_used(&self) -> bool {
         self.kind != DopplerKind::None
+    }
+
+    /// The farthest that a learnt scale with these settings can be from 1.
+    pub fn max_scale_error(&self) -> f64 {
+        4.0 * self.scale_sigma.max(OTHER_RADAR)
     }
 
     /// Returns the displacement ahead and to the left, m, along the heading in the middle, between

@@ -11,10 +11,12 @@ use crate::{
 pub struct Evidence {
     /// Number of the samples, or of the bearings, that determine it; zero: it was not measured.
     pub samples: u64,
-    /// From the stamp of the scan before to the stamp of the scan, s; zero of a velocity during the
-    /// scan.
+    /// From the stamp of the scan before to the stamp of the scan, s; zero of a velocity and of a
+    /// heading.
     pub interval_s: f64,
-    /// Quantities of the kind: see [`Witness`].
+    /// Of a gyro: the turn, rad, and the mean rate during the sweep, rad/s, both with the bias. Of
+    /// wheels: the distance ahead, m. Of Doppler: the velocity ahead and to the left, m/s. Of an
+    /// absolute heading: the heading at the stamp, rad.
     pub value: [f64; 2],
     /// Variance of the first value, covariance, variance of the second, but for the errors that all
     /// motions share: bias and scale.

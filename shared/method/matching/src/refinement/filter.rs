@@ -104,12 +104,12 @@ impl SharedErrors {
             max_scale_error,
             noise_per_sqrt_s: 0.0,
         };
-        let (wheels, doppler) = (&configs.wheels, configs.doppler.scale_sigma);
+        let (wheels, doppler) = (&configs.wheels, &configs.doppler);
         Witness::ALL.map(|kind| match kind {
             Witness::Gyro => Self::of_gyro(&configs.gyro),
             Witness::Wheels => of_distance(wheels.scale_sigma, wheels.scale().1),
             // An absolute heading has no filter of its own.
-            _ => of_distance(doppler, 4.0 * doppler),
+            _ => of_distance(doppler.scale_sigma, doppler.max_scale_error()),
         })
     }
 
@@ -324,7 +324,7 @@ impl Filter {
             registered: 0.0,
             scale: 1.0,
             scale_sigma: 0.0,
-            bias: self.offset_rad,
+            bias: wrap_angle(self.offset_rad),
             bias_sigma: self.covariance[(OFFSET, OFFSET)].max(0.0).sqrt(),
         }
     }

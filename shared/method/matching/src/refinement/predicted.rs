@@ -155,6 +155,11 @@ impl PredictedDistance {
         }
     }
 
+    /// By how much the motion in the map is longer, m: it takes back the error of the last match.
+    pub fn taken_back_m(&self) -> f64 {
+        self.distance_m - self.change_m
+    }
+
     pub fn is_certain(&self) -> bool {
         self.change_m.powi(2) > GATE * self.variance_m2
     }

@@ -316,15 +316,14 @@ impl Refiner {
         registered: &UncertainMotion,
     ) -> bool {
         let by = scan.step.distance.map(|it| it.by);
-        by.is_some_and(|kind| !self.agrees(kind, scan, registered))
+        by.is_some_and(|kind| !self.agrees(kind, scan, &self.seen(kind, registered, 0.0)))
     }
 
-    /// Returns whether a sensor has measured a distance that agrees with a registered pose.
-    fn agrees(&self, kind: Witness, scan: &Scan<'_>, registered: &UncertainMotion) -> bool {
-        let seen = self.seen(kind, registered, 0.0);
+    /// Returns whether a sensor has measured a distance that agrees with a registered place.
+    fn agrees(&self, kind: Witness, scan: &Scan<'_>, seen: &Seen) -> bool {
         let both = scan.step.predicted[kind as usize].zip(self.state.filters[kind as usize]);
         both.is_some_and(|(predicted, filter)| {
-            filter.gate(&seen, &predicted, 0.0) == Verdict::Agrees
+            filter.gate(seen, &predicted, 0.0) == Verdict::Agrees
         })
     }
 
@@ -356,7 +355,12 @@ impl Refiner {
     /// agrees is used again.
     pub(super) fn follow_distances(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
         for kind in distances() {
-            let agrees = self.agrees(kind, scan, registered);
+            // All of the variance of a predicted place accumulates.
+            let seen = Seen {
+                jitter: 0.0,
+                ..self.seen(kind, registered, 0.0)
+            };
+            let agrees = self.agrees(kind, scan, &seen);
             let predicted = scan.step.predicted[kind as usize];
             let Some((filter, predicted)) =
                 self.state.filters[kind as usize].as_mut().zip(predicted)
@@ -388,13 +392,18 @@ impl Refiner {
             }
         }
         let by = scan.step.distance.map(|it| it.by);
+        let taken_back_m = scan.step.distance.map_or(0.0, |it| it.taken_back_m());
         for kind in distances() {
             let predicted = scan.step.predicted[kind as usize];
             match (&mut self.state.filters[kind as usize], predicted) {
                 (Some(filter), Some(predicted)) if by == Some(kind) => {
                     filter.take_prediction(predicted.in_map, &predicted);
                 }
-                (Some(filter), _) => filter.inflate(motion.covariance[(0, 0)]),
+                (Some(filter), _) => {
+                    // The tracker has moved by so much more than the vehicle.
+                    filter.correction -= taken_back_m;
+                    filter.inflate(motion.covariance[(0, 0)]);
+                }
                 (None, _) => {}
             }
         }

@@ -117,7 +117,7 @@ impl Anchor {
 }
 
 impl TrackerState {
-    /// The filter of the heading, if a gyro has measured a turn.
+    /// The filter of the heading, if a gyro has measured a turn, or another sensor the heading.
     pub(super) fn heading_mut(&mut self) -> Option<&mut Filter> {
         self.filters[Witness::Gyro as usize].as_mut()
     }
