@@ -30,6 +30,9 @@ const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
 /// Standard deviation of the offset of an absolute heading, rad: any angle.
 const OFFSET_RAD: f64 = 2.0;
+/// After so many refused headings in a row the offset is learnt again: the first one was wrong, or
+/// a compass was moved.
+const MAX_REFUSALS: u32 = 40;
 /// Random walk of that offset, rad/√s: errors of a receiver or a compass that last.
 const OFFSET_WALK_RAD_PER_SQRT_S: f64 = 3e-5;
 
@@ -63,6 +66,8 @@ pub struct Filter {
     pub verdict: Verdict,
     /// The verdict on the absolute heading.
     pub offset_verdict: Verdict,
+    /// Number of absolute headings in a row that were refused.
+    pub refusals: u32,
     /// Correction and jitter at the last reported pose.
     pub reported: [f64; 2],
 }
@@ -162,8 +167,8 @@ impl Predicted {
             + self.scale_variance * change * changed.max(change)
     }
 
-    fn of_bias_and_scale(&self) -> f64 {
-        self.variance_after([0.0, 0.0]) - self.noise
+    fn of_scale(&self) -> f64 {
+        self.scale_variance * self.measured.powi(2)
     }
 }
 
@@ -246,13 +251,13 @@ impl Filter {
     }
 
     /// Compares a registered coordinate with the predicted one, where single matches err by up to
-    /// `gross_error`. A sensor that was refused is to agree by the bias and the scale that are
-    /// known: if these were free to move, they would follow it.
+    /// `gross_error`. A sensor that was refused is to agree by the scale that is known: a scale that
+    /// is free to move would follow it.
     pub(super) fn gate(&self, seen: &Seen, predicted: &Predicted, gross_error: f64) -> Verdict {
         let apart = seen.change - predicted.in_map;
         let mut variance = (SEEN * predicted.covariance * SEEN.transpose())[0];
         if self.verdict == Verdict::Refused {
-            variance -= predicted.of_bias_and_scale();
+            variance -= predicted.of_scale();
         }
         if apart.powi(2) <= GATE * (variance + seen.jitter + seen.drift) {
             Verdict::Agrees
@@ -312,8 +317,21 @@ impl Filter {
             false => Verdict::Refused,
         };
         if self.offset_verdict == Verdict::Agrees {
+            self.refusals = 0;
             self.correct_by(apart_rad, &OBSERVED, noise);
+            return;
         }
+        self.refusals += 1;
+        if self.refusals == MAX_REFUSALS {
+            self.free_offset();
+        }
+    }
+
+    fn free_offset(&mut self) {
+        self.refusals = 0;
+        self.covariance.row_mut(OFFSET).fill(0.0);
+        self.covariance.column_mut(OFFSET).fill(0.0);
+        self.covariance[(OFFSET, OFFSET)] = OFFSET_RAD.powi(2);
     }
 
     /// Returns the verdict on an absolute heading, with the offset as its bias.
@@ -434,9 +452,7 @@ impl Filter {
     /// A new chain of motions starts with a new map, at a heading of its own.
     pub(super) fn start_chain(&mut self) {
         self.reported = [self.correction, 0.0];
-        self.covariance.row_mut(OFFSET).fill(0.0);
-        self.covariance.column_mut(OFFSET).fill(0.0);
-        self.covariance[(OFFSET, OFFSET)] = OFFSET_RAD.powi(2);
+        self.free_offset();
     }
 }
 

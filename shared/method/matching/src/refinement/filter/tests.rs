@@ -249,6 +249,23 @@ fn an_absolute_heading_bounds_the_error_of_the_heading() {
     assert!(with < 0.1 * without, "{with} {without}");
 }
 
+/// Antennas that had no fix at first.
+#[test]
+fn an_offset_that_was_wrong_is_learnt_again() {
+    let mut drive = Drive::new(gyro(), 2);
+    for scan in 0..200 {
+        drive.step(Event::Fused, 0.03);
+        let offset_rad = if scan < 3 { 1.0 } else { 0.0 };
+        let measured = Evidence {
+            value: [wrap_angle(drive.truth + offset_rad), 0.0],
+            covariance: [1e-6, 0.0, 0.0],
+            ..Evidence::default()
+        };
+        drive.filter.observe(&measured, drive.at);
+    }
+    assert!(drive.filter.offset_verdict == Verdict::Agrees && drive.filter.offset_rad.abs() < 0.1);
+}
+
 #[test]
 fn a_heading_that_turns_the_other_way_is_refused() {
     let mut drive = Drive::new(gyro(), 1);
