@@ -42,8 +42,8 @@ pub struct Row {
     pub keys: [&'static str; 2],
     /// The metric of its measurements: name and description.
     pub metric: [&'static str; 2],
-    /// The figures of a run: name, place in `summary.json`, and decimals; without decimals it is the
-    /// count of something unusual.
+    /// The figures of a run: name, place in `summary.json`, and decimals; without decimals it is
+    /// the count of something unusual.
     pub figures: &'static [(&'static str, &'static str, Option<usize>)],
 }
 

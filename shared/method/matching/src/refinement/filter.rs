@@ -251,8 +251,8 @@ impl Filter {
     }
 
     /// Compares a registered coordinate with the predicted one, where single matches err by up to
-    /// `gross_error`. A sensor that was refused is to agree by the scale that is known: a scale that
-    /// is free to move would follow it.
+    /// `gross_error`. A sensor that was refused is to agree by the scale that is known: a scale
+    /// that is free to move would follow it.
     pub(super) fn gate(&self, seen: &Seen, predicted: &Predicted, gross_error: f64) -> Verdict {
         let apart = seen.change - predicted.in_map;
         let mut variance = (SEEN * predicted.covariance * SEEN.transpose())[0];
