@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Bytes of a checksum, of the filter of a kind of sensor, of a state without the names of its
 /// keyframes, of a name, and of a keyframe without its cells: at most.
 const CHECK: usize = 8;
-const FILTER: usize = 259;
+const FILTER: usize = 264;
 const STATE: usize = 440 + FILTER * Witness::ALL.len();
 const NAME: usize = 20;
 const HEAD: usize = 104;
@@ -156,6 +156,7 @@ mod tests {
         let filter = Filter {
             covariance: Matrix5::from_element(-0.3),
             verdict: Verdict::Refused,
+            refusals: u32::MAX,
             ..Filter::default()
         };
         let mut state = TrackerState {
