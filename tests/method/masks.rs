@@ -30,7 +30,7 @@ fn masks_of(data: &Path, folder: &Path, arguments: &[&str]) -> Ended {
     Ended::of(command)
 }
 
-/// The size of a picture. What is in it is tested beside its drawing.
+/// The size of a picture. Its content is tested beside its drawing.
 fn size(path: &Path) -> (u32, u32) {
     let file = BufReader::new(File::open(path).unwrap());
     png::Decoder::new(file).read_info().unwrap().info().size()

@@ -28,7 +28,12 @@ pub struct ExportArguments {
     pub mcap: Option<PathBuf>,
     /// Write the scans of a run in the form of its dataset instead, with each azimuth that was lost
     /// put back where the run has found it missing.
-    #[arg(long, value_parser = ["radiate"], requires = "out", conflicts_with_all = ["mcap", "scans", "frames", "mounting"])]
+    #[arg(
+        long,
+        value_parser = ["radiate"],
+        requires = "out",
+        conflicts_with_all = ["mcap", "scans", "frames", "mounting"],
+    )]
     pub format: Option<String>,
     /// The folder to write such a dataset to: a new or an empty one.
     #[arg(long, value_name = "FOLDER", requires = "format")]

@@ -51,7 +51,11 @@ pub struct RadarServerArguments {
     pub listen: String,
     /// Send the scans by UDP, as ASTERIX CAT-240, to this group or receiver, instead of serving
     /// them by TCP: 239.192.43.78:4378.
-    #[arg(long, value_name = "GROUP:PORT", conflicts_with_all = ["listen", "reset_every", "big_endian"])]
+    #[arg(
+        long,
+        value_name = "GROUP:PORT",
+        conflicts_with_all = ["listen", "reset_every", "big_endian"],
+    )]
     pub udp: Option<SocketAddrV4>,
     /// The address of this machine for sending datagrams; 0.0.0.0: the system chooses.
     #[arg(long, default_value = "127.0.0.1", value_name = "ADDRESS")]

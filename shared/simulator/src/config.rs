@@ -155,7 +155,7 @@ impl SimulationConfig {
         Ok(())
     }
 
-    /// Returns a sensor beside the radar; `None` if there is none.
+    /// Returns a sensor beside the radar; `None` if it is switched off.
     pub(crate) fn device<'a>(&self, of: SampleKind, path: &'a dyn Path) -> Option<Device<'a>> {
         match of {
             SampleKind::Gyro => gyro::device(&self.gyro, self.seed, path),

@@ -130,7 +130,7 @@ impl Configuration {
             .clone()
     }
 
-    /// Asserts that the results of a run are those of the undisturbed one.
+    /// Asserts that a run has the results of the undisturbed run.
     pub fn assert_undisturbed(&self, run: &Run, case: &str) {
         let undisturbed = self.undisturbed();
         let difference = undisturbed.results.difference(&self.results(run));

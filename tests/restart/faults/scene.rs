@@ -101,7 +101,7 @@ impl<'a> Scene<'a> {
         None
     }
 
-    /// The run must continue to its end. Returns what a fault returns that has struck, as the
+    /// The run must continue to its end. Returns `Some` as a fault that has struck, like the
     /// judgements below.
     pub fn finished(&self, run: &Run, running: Running) -> Option<()> {
         self.finished_with(&self.configuration.undisturbed().results, run, running)

@@ -14,8 +14,8 @@ use crate::stress::{
     fault::{self, FaultKind},
     helper::Work,
     pipeline::{Measured, Setup, measure},
-    report::{Check, Figures, ScenarioOutcome, Verdict},
-    search::{Found, Step, Steps, largest, step_duration},
+    report::{Check, Figures, ScenarioOutcome, Step, Verdict},
+    search::{Found, Steps, largest, step_duration},
     witness_fault::{self, WitnessFault},
 };
 

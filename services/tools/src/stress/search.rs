@@ -3,9 +3,8 @@
 use std::time::Duration;
 
 use gyre_configuration::terminal::Failure;
-use serde::Serialize;
 
-use crate::stress::report::{Check, Figures};
+use crate::stress::report::Step;
 
 /// Share of a scenario's time that a step of a search takes.
 const STEP: u32 = 6;
@@ -85,65 +84,6 @@ impl Steps {
             }
         }
         Ok(false)
-    }
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Step {
-    /// Scans a second, or radars.
-    pub level: f64,
-    /// True if all its pipelines keep the limits.
-    pub passed: bool,
-    /// Scans that were due, in all pipelines.
-    pub due: u64,
-    /// Scans without a pose, in all pipelines.
-    pub dropped: u64,
-    /// The largest 99th percentile of its pipelines, ms; of fewer than a hundred scans the maximum.
-    pub p99_ms: Option<f64>,
-    pub reason: Option<String>,
-}
-
-impl Step {
-    /// A step whose runs could not be started.
-    pub fn not_started(level: f64, reason: String) -> Self {
-        Self {
-            level,
-            reason: Some(reason),
-            ..Self::default()
-        }
-    }
-
-    pub fn of(level: f64, pipelines: &[(Vec<Check>, Option<String>, Figures)]) -> Self {
-        let figures = || pipelines.iter().map(|(.., figures)| figures);
-        let latencies = figures().map(|it| &it.latency.sensor_to_pose);
-        let p99_ms = latencies.filter_map(|it| it.judged(it.p99_ms));
-        let reason = pipelines.iter().find_map(|(checks, problem, _)| {
-            let failed = checks.iter().find(|check| !check.passed);
-            problem.clone().or_else(|| failed.map(Check::sentence))
-        });
-        Self {
-            level,
-            passed: reason.is_none(),
-            due: figures().map(|it| it.latency.counts.due).sum(),
-            dropped: figures().map(|it| it.latency.counts.dropped).sum(),
-            p99_ms: p99_ms.reduce(f64::max),
-            reason,
-        }
-    }
-
-    /// Returns `8.0 scans/s: p99 14.2 ms, 0 of 80 dropped`.
-    fn sentence(&self, unit: &str) -> String {
-        let Self {
-            level,
-            due,
-            dropped,
-            ..
-        } = self;
-        let p99 = self.p99_ms.map(|ms| format!("p99 {ms:.1} ms"));
-        let p99 = p99.as_deref().unwrap_or("no pose");
-        let reason = self.reason.as_ref().map(|reason| format!(": {reason}"));
-        let reason = reason.unwrap_or_default();
-        format!("  {level:.1} {unit}: {p99}, {dropped} of {due} dropped{reason}")
     }
 }
 

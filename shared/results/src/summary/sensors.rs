@@ -88,7 +88,8 @@ impl Serialize for Named<'_> {
                 map.serialize_entry("offset_sigma_rad", &last.bias_sigma)?;
             }
         }
-        if row.samples.is_some() {
+        // A heading, whose offset is unknown, is not compared with motions.
+        if row.samples.is_some() && row.measures != Measures::Heading {
             map.serialize_entry("delay_s", &count.delay_and_scale.map(|it| it[0]))?;
         }
         map.end()

@@ -41,7 +41,7 @@ pub(crate) fn device<'a>(
         rate_hz, delay_s, ..
     } = *config;
     let [noise_rad, offset_rad] = [config.noise_deg, config.offset_deg].map(f64::to_radians);
-    // Other numbers than those of the fixes.
+    // The fixes have different random numbers.
     let errors = Stream::GNSS_ERRORS.generator(!seed);
     (rate_hz > 0.0).then(|| Device {
         rate_hz,

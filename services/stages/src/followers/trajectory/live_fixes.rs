@@ -138,8 +138,8 @@ impl LiveFixes {
         Ok(self.sync.changed()?)
     }
 
-    /// Returns all fixes of the log; `None` if there are no new ones, or few beside all. With
-    /// `is_last` there are none after this.
+    /// Returns all fixes of the log; `None` if no fix is new, or few are new beside all. After
+    /// `is_last` no fix follows.
     pub fn examine(&mut self, is_last: bool) -> Result<Option<Fixes>, RunError> {
         if is_last {
             self.finish()?;

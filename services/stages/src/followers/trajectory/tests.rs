@@ -229,7 +229,7 @@ fn messages_are_logged_once_whoever_is_restarted_and_the_missing_ones_are_counte
     trajectory.live_fixes = Some(restarted);
     fix(6);
     follow(&mut trajectory);
-    // A step takes what has arrived, before the end.
+    // A step takes the fixes that have arrived, before the end.
     let text = std::fs::read_to_string(&log).unwrap();
     assert!(text.ends_with("\n6,2,3,0,0.5\n"), "{text}");
     // The source has died before it has sent the eighth.

@@ -3,7 +3,7 @@
 
 use gyre_geometry::{
     Pose, Twist, UncertainMotion, pose,
-    samples::{DopplerConfig, Witness},
+    samples::{DopplerConfig, Evidence, Witness},
 };
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -15,6 +15,10 @@ use super::filter::{GATE, Predicted, Seen, grown};
 const BIAS_TIME_S: f64 = 30.0;
 /// Angle after which an error of the gyro's scale counts as new, rad: a bend.
 const SCALE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
+
+/// The measurements about a motion, in the order of [`Witness::ALL`]. The measurement by Doppler is
+/// the displacement.
+pub(super) type Measured = [Option<Evidence>; Witness::ALL.len()];
 
 /// The motions whose error the next match takes back: all since the last match, or since a new map
 /// was started.

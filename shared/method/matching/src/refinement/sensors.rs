@@ -2,7 +2,7 @@
 
 use gyre_geometry::{
     Pose, UncertainMotion,
-    samples::{AllEvidence, Evidence, Measures, Witness},
+    samples::{AllEvidence, Measures, Witness},
     wrap_angle,
 };
 use nalgebra::{Matrix3, Vector3};
@@ -12,7 +12,7 @@ use super::{
     candidates::{Candidate, Scan},
     config::JITTER_DEG,
     filter::{GATE, Seen, Verdict},
-    predicted::{PredictedDistance, PredictedTurn, seen_distance},
+    predicted::{Measured, PredictedDistance, PredictedTurn, seen_distance},
     tracker::Step,
     uncertainty::with_variance,
 };
@@ -24,10 +24,6 @@ const DRIFT_RAD_PER_SQRT_M: f64 = 5.2e-5;
 const JUMP_GAIN: f64 = 0.05;
 const GYRO: usize = Witness::Gyro as usize;
 const DOPPLER: usize = Witness::Doppler as usize;
-
-/// The measurements about a motion, in the order of [`Witness::ALL`]. The measurement by Doppler is
-/// the displacement.
-pub(super) type Measured = [Option<Evidence>; Witness::ALL.len()];
 
 /// The filter of a kind: an absolute heading belongs to the filter of the heading.
 const fn filter_of(kind: Witness) -> usize {

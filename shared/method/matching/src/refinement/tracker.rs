@@ -12,8 +12,7 @@ use super::{
     Filter, Outcome, RefinementConfig, SinceMatch, Standstill,
     config::{JITTER_DEG, JITTER_M},
     filter::Predicted,
-    predicted::{PredictedDistance, PredictedTurn},
-    sensors::Measured,
+    predicted::{Measured, PredictedDistance, PredictedTurn},
 };
 
 /// Weight of the newest velocity, which jitters with each match, in its running mean.

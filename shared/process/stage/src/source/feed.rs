@@ -149,7 +149,7 @@ impl<'a, M> Feed<'a, M> {
     }
 
     pub fn end(&mut self, item: Item) -> Result<(), RunError> {
-        // Those of the drive are there before its end.
+        // The fixes of the drive precede its end.
         self.fixes.iter_mut().try_for_each(Fixes::receive)?;
         let mut outputs = self.outputs.iter();
         outputs.try_for_each(|output| output.end(item, Some(StageId::RadarReplay)))?;
