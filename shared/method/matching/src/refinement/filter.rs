@@ -22,9 +22,9 @@ use super::Witnessed;
 /// them is wrong: four standard deviations.
 pub(super) const GATE: f64 = 16.0;
 /// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s. It is
-/// the residual of the best bias and scale in the turns over 4 to 16 s on six simulated roads,
-/// whose gradient is 2.6 % RMS along and across.
-const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
+/// the residual of the best bias and scale in the turns over 0.5 to 8 s on six simulated roads,
+/// whose gradient is 2.6 % RMS along and across: 5.2e-4 RMS, 2e-4 to 1.1e-3 on single roads.
+const TILT_RAD_PER_SQRT_S: f64 = 5e-4;
 /// Random walk of the scale of wheels and Doppler, /√s: tyres that warm change it by 0.06 % in an
 /// hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
