@@ -1,6 +1,7 @@
 //! Restarts and results: whatever is killed, full or taken away, the results are the undisturbed
 //! ones.
 
+mod commands;
 pub mod faults;
 mod full_disk;
 mod identity;

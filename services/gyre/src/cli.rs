@@ -14,8 +14,8 @@ use gyre_tools::{
     masks::MasksArguments,
     new::New,
     operate::{
-        EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
-        TopArguments,
+        EchoArguments, LocateArguments, LogsArguments, PsArguments, ResetArguments,
+        RestartArguments, RunChoice, SwapArguments, TopArguments,
     },
     radar_server::RadarServerArguments,
     report::ReportArguments,
@@ -77,6 +77,10 @@ pub enum Command {
     Restart(RestartArguments),
     /// Replace the program of a stage of a running run, without losing a scan.
     Swap(SwapArguments),
+    /// Begin a new chain of motions at a pose, in a running run.
+    Reset(ResetArguments),
+    /// Give a running run the pose of the vehicle in the map in which it localises.
+    Locate(LocateArguments),
     /// Run a second program beside a stage of a running run, and compare what both make of the same
     /// inputs. Its results are never used.
     Shadow(ShadowArguments),

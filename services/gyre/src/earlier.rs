@@ -13,7 +13,7 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_contract::{
-    StageId,
+    Commands, StageId,
     run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side},
 };
 use gyre_geometry::samples::SensorConfigs;
@@ -354,10 +354,11 @@ fn damaged(error: LogError) -> Failure {
     }
 }
 
-fn state(out: &Path) -> [PathBuf; 12] {
+fn state(out: &Path) -> [PathBuf; 13] {
     let [ledger, generations] = state_of_recording(out);
     [
         journal::path(out),
+        Commands::path_in(out),
         checkpoint::path(out),
         records_path::<Keyframe>(out),
         records_path::<Place>(out),

@@ -11,7 +11,10 @@ use gyre_configuration::{
     terminal::{Failure, INTERRUPTED, execute_again, own, print},
     with_stored_options,
 };
-use gyre_contract::run::{Ending, Report};
+use gyre_contract::{
+    Commands,
+    run::{Ending, Report},
+};
 use gyre_datasets::SampleLog;
 use gyre_geometry::samples::SensorKind;
 use gyre_recording::{copied_fixes, received_fixes};
@@ -95,6 +98,8 @@ struct Ready {
     resolved: Configuration,
     checked: Preflight,
     identity: Identity,
+    /// The text of the commands that the run is given at its begin.
+    commands: Option<String>,
     /// True if the run continues its own earlier recording.
     recording_goes_on: bool,
 }
@@ -125,6 +130,7 @@ fn make_ready(
         checked.scans.recording.as_ref().map(|it| &it.fingerprint),
     )?;
     earlier.require_recording(&identity, out)?;
+    let commands = commands(configuration)?;
     let recording_goes_on = earlier.recording_goes_on(&identity);
     plan::require_recordable(&configuration.record, out.path(), recording_goes_on)?;
     if let Some(begun) = unfinished.filter(|begun| begun.lost > 0) {
@@ -139,6 +145,7 @@ fn make_ready(
         resolved,
         checked,
         identity,
+        commands,
         recording_goes_on: recording_goes_on && configuration.record.is_on(),
     })
 }
@@ -195,6 +202,24 @@ fn play(
     }
 }
 
+/// Reads the commands that another run has had.
+fn commands(configuration: &Configuration) -> Result<Option<String>, Failure> {
+    let Some(path) = &configuration.source.commands else {
+        return Ok(None);
+    };
+    let text = storage::read_text(path, storage::SETTINGS);
+    let text = text.map_err(|error| format!("{} (source.commands): {error}", path.display()))?;
+    let commands = Commands::read(path)?;
+    match (1..=commands.len()).find(|number| commands.from_ns(*number).is_none()) {
+        Some(number) => Err(format!(
+            "{} (source.commands): command {number} has no time from which it applies",
+            path.display()
+        )
+        .into()),
+        None => Ok(Some(text)),
+    }
+}
+
 fn prepare(
     configuration: &Configuration,
     ready: &Ready,
@@ -206,6 +231,9 @@ fn prepare(
         None => {
             let resolved = configuration.to_toml()?;
             earlier::begin(out, &ready.identity, &resolved, ready.recording_goes_on)?;
+            if let Some(commands) = &ready.commands {
+                storage::write(&Commands::path_in(out.path()), commands)?;
+            }
         }
     }
     if let Some(truth) = &ready.checked.scans.truth {

@@ -2,6 +2,7 @@
 //! compensation. [`gyre_masking::Masker`] does the work. The velocity by Doppler is measured here,
 //! where the rows of the scan are.
 
+mod commands;
 mod live;
 mod lossless;
 mod motions;

@@ -1,10 +1,12 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each
-//! pose before it is published. With SLAM it logs keyframes, with objects each scan. In live mode
+//! pose before it is published. A reset by a command begins at its pose. With SLAM it logs keyframes, with objects each scan. In live mode
 //! poses continue when the disk is full, and are not kept from then on.
 
 use gyre_contract::{
-    Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag, run::StageCounters,
+    Command, Commands, Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag,
+    run::StageCounters,
 };
+use gyre_geometry::{covariance, xy_yaw};
 use gyre_journal::{Journal, PoseLog, keyframes::Keyframes, scans::Scans};
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
@@ -40,6 +42,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     }
     let mut integration = Integration {
         journal,
+        commands: Commands::open(out).map_err(RunError::input)?,
         last,
         logs,
         // A stage that died on the full disk has left it.
@@ -54,6 +57,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
 
 struct Integration {
     journal: Journal,
+    commands: Commands,
     last: Option<PoseHeader>,
     /// The logs that the run has, and what wakes the followers of each.
     logs: Vec<(Box<dyn PoseLog>, Notifier)>,
@@ -78,6 +82,7 @@ impl Sink for Integration {
         motion: &MotionHeader,
         scan: Option<&Received<Masked>>,
     ) -> Result<PoseHeader, RunError> {
+        self.obey(&motion.item)?;
         let mut pose = compose(self.last.as_ref(), motion);
         pose.item.hop_mut(Self::HOP).finished_ns = clock::now_ns();
         if let Some(scan) = scan {
@@ -118,6 +123,34 @@ impl Sink for Integration {
 }
 
 impl Integration {
+    /// Applies the commands that are new with a scan.
+    fn obey(&mut self, item: &Item) -> Result<(), RunError> {
+        let before = self.last.map_or(0, |last| last.item.commands);
+        if item.commands == before {
+            return Ok(());
+        }
+        self.commands.refresh().map_err(RunError::input)?;
+        if self.commands.len() < item.commands {
+            let (seq, commands) = (item.seq, item.commands);
+            return Err(RunError::Input(format!(
+                "scan {seq} has {commands} commands, but journal/commands.jsonl has fewer"
+            )));
+        }
+        for command in self.commands.between(before, item.commands) {
+            for (log, _) in &mut self.logs {
+                log.obey(command).map_err(unusable)?;
+            }
+            if let Command::Reset { at, .. } = command {
+                let start = self.last.get_or_insert_default();
+                let given = at.pose();
+                [start.x_m, start.y_m, start.yaw_rad] = xy_yaw(&given.motion);
+                start.covariance = covariance::pack(&given.covariance);
+                start.accumulated_covariance = start.covariance;
+            }
+        }
+        Ok(())
+    }
+
     /// Waits until all that was written survives a power failure: a failure is found by nobody
     /// after this process.
     fn sync(&self) -> Result<(), RunError> {

@@ -1,10 +1,11 @@
 //! The commands that operate running runs: `gyre up`, `down`, `ps`, `logs`, `top`, `restart`,
-//! `swap` and `echo`.
+//! `swap`, `reset`, `locate` and `echo`.
 //!
 //! Each asks the supervisor of a run at its control socket ([`gyre_client::control`]); nothing of a
 //! run is looked up elsewhere, but its logs.
 
 mod background;
+mod commands;
 mod echo;
 mod hz;
 mod logs;
@@ -20,6 +21,7 @@ use gyre_configuration::terminal::{Failure, print};
 
 pub(crate) use background::status_of;
 pub use background::{detach_if_asked, down, up};
+pub use commands::{LocateArguments, ResetArguments, locate, reset};
 pub use echo::{EchoArguments, echo};
 pub use logs::{LogsArguments, logs};
 pub use processes::{PsArguments, ps};

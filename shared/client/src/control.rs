@@ -10,10 +10,14 @@ use std::{
     fs, io,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
-    time::Duration,
+    thread,
+    time::{Duration, Instant},
 };
 
-use gyre_contract::control::{Answer, PendingSwap, Request, SOCKET, Status, Swap};
+use gyre_contract::{
+    Command, Commands,
+    control::{Answer, PendingSwap, Request, SOCKET, Status, Swap},
+};
 
 use exchange::Sent;
 use gyre_transport::{Manifest, RunError, run, sessions::not_running};
@@ -21,6 +25,9 @@ use gyre_transport::{Manifest, RunError, run, sessions::not_running};
 /// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
 const ANSWER: Duration = Duration::from_secs(15);
 const LOOK: Duration = Duration::from_secs(1);
+/// Time for a scan from which a command applies, and between two looks for it.
+const APPLIED: Duration = Duration::from_secs(5);
+const APPLIED_LOOK: Duration = Duration::from_millis(20);
 /// Appended if the client stops waiting for a request that changes something.
 const NOT_LATER: &str = "; what it has not begun by now it does not begin";
 
@@ -123,6 +130,26 @@ impl Control {
             Answer::Untried(sentence) => Ok(Some(sentence)),
             answer => self.is_done(answer).map(|()| None),
         }
+    }
+
+    /// Gives the run a command, and waits for the scan from which it applies. Returns the time of
+    /// that scan, ns on the sensor's clock; `None` if no scan has come: it then applies to the next
+    /// one.
+    pub fn command(&self, command: Command) -> Result<Option<i64>, RunError> {
+        let number = match self.ask(&Request::Command(command), NOT_LATER)? {
+            Answer::Numbered(number) => number,
+            answer => return self.is_done(answer).map(|()| None),
+        };
+        let mut commands = Commands::open(&self.out).map_err(RunError::input)?;
+        let since = Instant::now();
+        while since.elapsed() < APPLIED && self.is_there() {
+            commands.refresh().map_err(RunError::input)?;
+            if let Some(from_ns) = commands.from_ns(number) {
+                return Ok(Some(from_ns));
+            }
+            thread::sleep(APPLIED_LOOK);
+        }
+        Ok(None)
     }
 
     /// Returns whether the run is still there: its supervisor lives, and has not written all

@@ -10,9 +10,10 @@ use toml::{Table, Value};
 
 use crate::{ConfigurationError, strict};
 
-const KEYS: [&str; 10] = [
+const KEYS: [&str; 11] = [
     "run.ground_truth",
     "source.data",
+    "source.commands",
     "simulation.drive.file",
     "masking.model",
     "masking.runtime",

@@ -7,11 +7,11 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::run::StageCounters;
+use crate::{command::Command, run::StageCounters};
 
 pub const SOCKET: &str = "control.sock";
 
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Request {
     Status,
@@ -21,6 +21,7 @@ pub enum Request {
         process: String,
     },
     Swap(Swap),
+    Command(Command),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,6 +39,8 @@ pub struct Swap {
 pub enum Answer {
     Status(Box<Status>),
     Done,
+    /// To [`Request::Command`]: the number that it has in the file of commands.
+    Numbered(u64),
     Refused(String),
     /// To [`Request::Swap`]: the program has taken over, and nothing has shown yet that it works; a
     /// sentence.

@@ -99,7 +99,7 @@ wire! {
 
 wire! {
     /// The identity of a scan: its numbers and its times.
-    pub struct Item = "gyre_item_v6" {
+    pub struct Item = "gyre_item_v7" {
         /// Sequence number in the chain of motions: consecutive, from 0. Readers check it for gaps.
         pub seq: u64,
         /// Index of the scan in the recording, or the sensor's own count.
@@ -112,6 +112,9 @@ wire! {
         /// The first number that its generation gives. Items of earlier generations with this
         /// number or a later one are void: nothing was computed from them that lasts.
         pub numbered_from: u64,
+        /// Number of commands to the run that apply to this scan, from masking on: the last command
+        /// of the scan before and this one differ where one applies from this scan on.
+        pub commands: u64,
         /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
         pub stamp_ns: i64,
         /// Time when the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`,
@@ -227,4 +230,4 @@ impl Item {
 }
 
 // Sizes are part of the wire format.
-const _: () = assert!(size_of::<Hop>() == 32 && size_of::<Item>() == 112 + 7 * 32);
+const _: () = assert!(size_of::<Hop>() == 32 && size_of::<Item>() == 120 + 7 * 32);

@@ -5,6 +5,7 @@
 //! different versions reject each other's messages instead of misreading them.
 
 mod basis;
+mod command;
 pub mod control;
 mod follower;
 mod gnss;
@@ -26,6 +27,7 @@ mod topics;
 pub mod wire;
 
 pub use basis::{Basis, WitnessCounts};
+pub use command::{Command, CommandError, Commands, GivenPose};
 pub use follower::{CorrectionHeader, FixHeader, LoopHeader, fix_status};
 pub use gnss::GnssHeader;
 pub use gyre_geometry::{

@@ -13,7 +13,7 @@ use crate::{
 wire! {
     /// A pose in the frame of the first scan: x forward, y to the left, yaw counter-clockwise, in
     /// (-pi, pi].
-    pub struct PoseHeader = "gyre_pose_header_v13" {
+    pub struct PoseHeader = "gyre_pose_header_v14" {
         pub item: Item,
         pub motion: MotionEstimate,
         pub x_m: f64 [REACH],
@@ -57,7 +57,7 @@ impl PoseHeader {
 /// The journal of a run: its poses, then the end of the stream, since its item counts the scans.
 impl Record for PoseHeader {
     const FILE: &'static str = "poses.journal";
-    const MAGIC: LogMagic = *b"gyre journal v13";
+    const MAGIC: LogMagic = *b"gyre journal v14";
     const LENGTH: Option<usize> = Some(size_of::<Self>());
 
     fn encode(&self, bytes: &mut Vec<u8>) {

@@ -7,7 +7,7 @@ mod value;
 
 use bytemuck::Pod;
 
-pub use bounds::{Bounds, Number, REACH};
+pub use bounds::{Bounds, Number, REACH, REACH_M};
 pub(crate) use bounds::{field, require};
 pub(crate) use codes::codes;
 pub use value::Value;

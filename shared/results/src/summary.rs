@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
 use gyre_contract::{
-    Footprint, StageId,
+    Commands, Footprint, StageId,
     run::{
         Ending, Mode, Rate, Report, StageCounters, Swapped,
         latency::{Latency, Percentiles},
@@ -93,6 +93,20 @@ fn problem(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Op
         )
     };
     Some(sentence)
+}
+
+/// Returns why commands have changed nothing.
+fn unapplied(out: &Path, counts: &Counts) -> Option<String> {
+    let given = match Commands::open(out) {
+        Ok(commands) => commands.len(),
+        Err(error) => return Some(error.to_string()),
+    };
+    let applied = counts.commands.unwrap_or_default();
+    (applied < given).then(|| {
+        format!(
+            "{applied} of {given} commands have changed poses: no scan has come since, or the others are of times after the last scan"
+        )
+    })
 }
 
 #[derive(Debug)]
@@ -188,7 +202,8 @@ impl Summary {
         let (counts, gnss) = (&measured.counts, measured.gnss.as_ref());
         let of_sensors = || sensors::problem(configuration, counts, gnss);
         let problem = problem(&configuration.data(), out, session, counts)
-            .or_else(|| of_sensors().filter(|_| has_ended));
+            .or_else(|| of_sensors().filter(|_| has_ended))
+            .or_else(|| unapplied(out, counts).filter(|_| has_ended));
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         let recovery = report.into_iter().flat_map(|report| &report.recovery);
         Self {

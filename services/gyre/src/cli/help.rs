@@ -61,6 +61,9 @@ gyre restart masking
 gyre restart masking out/radar
 gyre swap masking --command ./my-masking
 gyre swap masking out/radar
+gyre reset
+gyre reset out/radar --pose 12,-3,90 --keep-map
+gyre locate out/radar --pose 12,-3,90
 gyre shadow masking --command ./my-masking --scans 200
 gyre shadow refinement out/radar
 

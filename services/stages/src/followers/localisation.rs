@@ -1,8 +1,9 @@
 //! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
-//! publishes each place as a `fix`. Its fixes depend only on the keyframes and the map.
+//! publishes each place as a `fix`. Its fixes depend only on the keyframes, the map, and the commands
+//! that give a place.
 
-use gyre_contract::{Fix, FixHeader, Item, fix_status, run::StageCounters};
-use gyre_geometry::{covariance, xy_yaw};
+use gyre_contract::{Command, Commands, Fix, FixHeader, Item, fix_status, run::StageCounters};
+use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_matching::RefinementConfig;
 use gyre_radar::points::PointsConfig;
 use gyre_slam::{
@@ -25,6 +26,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let mut places = Fixes {
         keyframes: RecordReader::open(&launch.manifest.out)?,
         localiser: localiser.map_err(RunError::input)?,
+        commands: Commands::open(&launch.manifest.out).map_err(RunError::input)?,
+        obeyed: 0,
         read: 0,
     };
     follower::run(launch, &mut places)
@@ -33,6 +36,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
 struct Fixes {
     keyframes: RecordReader<Keyframe>,
     localiser: Localiser,
+    commands: Commands,
+    /// Number of commands that applied to the keyframe before.
+    obeyed: u64,
     read: usize,
 }
 
@@ -43,22 +49,41 @@ impl Fixes {
         self.keyframes.refresh()?;
         if self.keyframes.unchanged() < self.read {
             self.localiser.reset();
-            self.read = 0;
+            (self.read, self.obeyed) = (0, 0);
         }
         Ok(())
     }
 
     fn locate_next(&mut self) -> Result<FixHeader, RunError> {
         let keyframe = self.keyframes.read(self.read)?;
+        let mut motion = keyframe.motion;
+        if let Some(given) = self.given(keyframe.stamp_ns)? {
+            self.localiser.place(given, keyframe.stamp_ns);
+            motion = UncertainMotion::identity();
+        }
         let found = self.localiser.locate(&Observation {
             stamp_ns: keyframe.stamp_ns,
             points: &keyframe.points,
             twist: keyframe.twist,
-            motion: keyframe.motion,
+            motion,
         });
         let header = header(self.read, &keyframe, &found, self.localiser.map());
         self.read += 1;
         Ok(header)
+    }
+
+    /// Returns the place that a command has given since the keyframe before.
+    fn given(&mut self, stamp_ns: i64) -> Result<Option<UncertainMotion>, RunError> {
+        self.commands.refresh().map_err(RunError::input)?;
+        let apply = self.commands.applied(stamp_ns).max(self.obeyed);
+        let new = self.commands.between(self.obeyed, apply);
+        let places = new.filter_map(|command| match command {
+            Command::Locate { at } => Some(at.pose()),
+            Command::Reset { .. } => None,
+        });
+        let place = places.last();
+        self.obeyed = apply;
+        Ok(place)
     }
 }
 

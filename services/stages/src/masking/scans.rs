@@ -1,6 +1,6 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
-use gyre_contract::{Item, Scan, Window, flag};
+use gyre_contract::{Commands, Item, Scan, Window, flag};
 use gyre_geometry::{
     LostAzimuths, Twist,
     samples::{AllEvidence, Sample, SampledSensors},
@@ -12,6 +12,7 @@ use gyre_stage::{
 use gyre_transport::{Listener, RunError, reader::Received};
 
 use crate::masking::{
+    commands::AppliedCommands,
     live::NewestOnly,
     lossless::{InOrder, Queue},
     motions::Motions,
@@ -19,9 +20,12 @@ use crate::masking::{
 
 pub struct Scans {
     queue: Box<dyn Queue>,
+    commands: AppliedCommands,
     motions: Motions,
     sensors: SampledSensors,
     sampled: Option<u64>,
+    /// True if a chain of motions starts with the current scan.
+    starts_chain: bool,
     window: Window,
     /// The velocities for the current and for the previous scan.
     found: [Option<Twist>; 2],
@@ -53,8 +57,11 @@ impl Inputs for Scans {
             false => Box::new(InOrder::open(launch)?),
             true => Box::new(NewestOnly::open(launch)?),
         };
+        let commands = Commands::open(&launch.manifest.out).map_err(RunError::input)?;
         Ok(Self {
             queue,
+            commands: AppliedCommands::new(commands),
+            starts_chain: false,
             motions,
             sensors: SampledSensors::new(&launch.sensors()?),
             sampled: None,
@@ -75,9 +82,19 @@ impl Inputs for Scans {
         let newest_pose = self.motions.credit.newest;
         let action = self.queue.next_action(&resume_at, newest_pose)?;
         match action {
-            Action::Process(item, _) if !self.find_motions(&item) => return Ok(Action::Wait),
-            Action::Process(item, _) => self.take_samples(item.is(flag::BREAK))?,
-            Action::Keep => self.take_samples(false)?,
+            Action::Process(item, received_ns) => {
+                let item = self.commands.mark(&item, &resume_at)?;
+                if !self.find_motions(&item) {
+                    return Ok(Action::Wait);
+                }
+                self.starts_chain = item.is(flag::BREAK);
+                self.take_samples()?;
+                return Ok(Action::Process(item, received_ns));
+            }
+            Action::Keep => {
+                self.starts_chain = false;
+                self.take_samples()?;
+            }
             _ => {}
         }
         Ok(action)
@@ -87,13 +104,14 @@ impl Inputs for Scans {
         let [motion, previous_motion] = self.found;
         let [previous_twist, twist] = self.sensors.with_yaw_rates([previous_motion, motion]);
         let [lost, previous_lost] = self.lost;
+        let previous = self.queue.previous().filter(|_| !self.starts_chain);
         Some(ScanView {
             current: MovedScan {
                 scan: self.queue.current()?,
                 twist,
                 lost,
             },
-            previous: self.queue.previous().map(|scan| MovedScan {
+            previous: previous.map(|scan| MovedScan {
                 scan,
                 twist: previous_twist,
                 lost: previous_lost,
@@ -142,7 +160,7 @@ impl Scans {
     /// Hands the samples of the current scan to the sensors, once. Before that it hands over
     /// the samples of the previous scan, if that scan came with a restart, and of the scans dropped
     /// since.
-    fn take_samples(&mut self, starts_chain: bool) -> Result<(), RunError> {
+    fn take_samples(&mut self) -> Result<(), RunError> {
         let dropped = self.queue.take_dropped();
         let scans = [self.queue.previous(), self.queue.current()];
         let is_new = |scan: &&Received<Scan>| self.sampled < Some(scan.item().published);
@@ -151,7 +169,7 @@ impl Scans {
             return Ok(());
         };
         match previous {
-            _ if starts_chain => self.sensors.clear(),
+            _ if self.starts_chain => self.sensors.clear(),
             Some(previous) => {
                 let (samples, stamp_ns, span_ns) = samples_of(previous)?;
                 self.sensors.push(samples, stamp_ns, span_ns);

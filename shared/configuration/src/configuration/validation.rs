@@ -181,6 +181,8 @@ impl Configuration {
                 "burst needs a pace: set run.rate to `realtime` or a factor";
             "source" if !source.faults.is_empty() && !plays_scans =>
                 "faults are put into the scans of a recording or a simulation, which this run does not play: remove them";
+            "source" if source.commands.is_some() && source.from != PlayedFrom::Scan =>
+                "commands need masking, whose place `from` takes: remove one of them";
             "run" if is_live && run.rate == Rate::Max && has_scans =>
                 "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
         }

@@ -57,6 +57,10 @@ pub struct SourceConfig {
     /// `scan` every message must have been recorded.
     #[serde(skip_serializing_if = "crate::run::unset::is_default")]
     pub from: PlayedFrom,
+    /// Commands to give at the times that it has: `journal/commands.jsonl` of another run of the
+    /// same scans, whose poses this run then repeats.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub commands: Option<PathBuf>,
     /// First scan to play, from 0.
     pub first: usize,
     /// Number of scans to play. Default: all, and of a radar without end.
@@ -101,6 +105,7 @@ impl Default for SourceConfig {
             silence_s: 3.0,
             data: PathBuf::new(),
             from: PlayedFrom::Scan,
+            commands: None,
             first: 0,
             scans: None,
             repeat: false,

@@ -13,7 +13,8 @@ use crate::limits::Limits;
 const ROUNDING_RAD: f64 = 1e-9;
 
 /// The largest coordinate of a pose, m: more than a way around the earth.
-pub const REACH: Bounds = Bounds::Within(-1e8, 1e8);
+pub const REACH_M: f64 = 1e8;
+pub const REACH: Bounds = Bounds::Within(-REACH_M, REACH_M);
 
 #[derive(Clone, Copy, Debug)]
 pub enum Bounds {

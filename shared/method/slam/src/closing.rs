@@ -22,7 +22,7 @@ use crate::{
 
 /// Length of the path between a keyframe and the earlier ones that it is compared with, at least,
 /// m.
-const GAP_M: f64 = 100.0;
+pub(crate) const GAP_M: f64 = 100.0;
 /// Number of candidates that are verified, and the distance along the path between two, at least,
 /// m.
 const CANDIDATES: usize = 3;

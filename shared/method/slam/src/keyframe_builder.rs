@@ -1,12 +1,16 @@
 use std::mem;
 
 use gyre_geometry::{OdometryMotion, Pose, Twist, UncertainMotion};
+use nalgebra::Matrix3;
 
-use crate::Keyframe;
+use crate::{Keyframe, closing::GAP_M};
 
 /// A scan becomes a keyframe at this distance or rotation from the last keyframe, m and degrees.
 const DISTANCE_M: f64 = 2.0;
 const ANGLE_DEG: f64 = 15.0;
+/// Length of the path that counts between a keyframe and one whose pose is given, m: the two are in
+/// no common submap, and can close a loop.
+const PATH_TO_GIVEN_M: f64 = GAP_M;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScanPose {
@@ -41,6 +45,10 @@ pub struct KeyframeBuilder {
     last: Option<(Pose, f64)>,
     /// The motion since the last keyframe, with the covariance of its drift.
     motion: UncertainMotion,
+    /// True if the next scan becomes a keyframe, wherever it is.
+    is_due: bool,
+    /// The covariance of the pose of the next scan, if that is given and not measured.
+    given: Option<Matrix3<f64>>,
 }
 
 impl Default for KeyframeBuilder {
@@ -48,6 +56,8 @@ impl Default for KeyframeBuilder {
         Self {
             last: None,
             motion: UncertainMotion::identity(),
+            is_due: false,
+            given: None,
         }
     }
 }
@@ -60,6 +70,18 @@ impl KeyframeBuilder {
         self.motion = UncertainMotion::identity();
     }
 
+    /// Makes the next scan a keyframe.
+    pub fn require_next(&mut self) {
+        self.is_due = true;
+    }
+
+    /// Makes the next scan a keyframe whose pose is given, with this covariance of (x, y, yaw), the
+    /// same along all axes: the motion to it is not measured.
+    pub fn give_next(&mut self, covariance: Matrix3<f64>) {
+        self.is_due = true;
+        self.given = Some(covariance);
+    }
+
     /// Takes the next scan. Returns it if it becomes a keyframe, with no points yet.
     pub fn next(&mut self, scan: &ScanPose) -> Option<Keyframe> {
         self.motion = self.motion.then(&scan.motion.drift());
@@ -70,12 +92,20 @@ impl KeyframeBuilder {
                 let motion = last.inv_mul(&pose);
                 let distance_m = motion.translation.vector.norm();
                 let angle_rad = motion.rotation.angle().abs();
-                if distance_m < DISTANCE_M && angle_rad < ANGLE_DEG.to_radians() {
+                let is_far = distance_m >= DISTANCE_M || angle_rad >= ANGLE_DEG.to_radians();
+                if !is_far && !self.is_due {
                     return None;
                 }
-                path_m + distance_m
+                match self.given.take() {
+                    None => path_m + distance_m,
+                    Some(covariance) => {
+                        self.motion = UncertainMotion { motion, covariance };
+                        path_m + PATH_TO_GIVEN_M
+                    }
+                }
             }
         };
+        (self.is_due, self.given) = (false, None);
         self.last = Some((pose, path_m));
         let motion = mem::replace(&mut self.motion, UncertainMotion::identity());
         Some(Keyframe {
@@ -102,7 +132,7 @@ mod tests {
     fn scans(count: u64) -> Vec<ScanPose> {
         let step = UncertainMotion {
             motion: pose(1.5, 0.1, 0.05),
-            covariance: nalgebra::Matrix3::from_diagonal_element(0.01),
+            covariance: Matrix3::from_diagonal_element(0.01),
         };
         let step = OdometryMotion::independent(step);
         let mut at = UncertainMotion::identity();

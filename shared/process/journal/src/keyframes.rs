@@ -2,7 +2,7 @@
 
 use std::{mem, path::Path};
 
-use gyre_contract::PoseHeader;
+use gyre_contract::{Command, CommandError, Commands, PoseHeader};
 use gyre_geometry::SparsePoint;
 use gyre_slam::{Keyframe, KeyframeBuilder, ScanPose};
 use gyre_storage::{LogError, RecordLog, RecordReader, records_path};
@@ -61,6 +61,15 @@ impl PoseLog for Keyframes {
         Ok(true)
     }
 
+    /// A command makes the next pose a keyframe. A reset without its map begins the log again.
+    fn obey(&mut self, command: &Command) -> Result<(), LogError> {
+        if is_new_map(command) {
+            self.log.cut(0)?;
+        }
+        obey(&mut self.builder, command);
+        Ok(())
+    }
+
     fn end(&mut self) -> Result<(), LogError> {
         self.log.end()
     }
@@ -95,6 +104,24 @@ fn newest(
     Ok((0, None))
 }
 
+fn is_new_map(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Reset {
+            keep_map: false,
+            ..
+        }
+    )
+}
+
+fn obey(builder: &mut KeyframeBuilder, command: &Command) {
+    match command {
+        Command::Reset { at, keep_map: true } => builder.give_next(at.pose().covariance),
+        Command::Reset { .. } => *builder = KeyframeBuilder::default(),
+        Command::Locate { .. } => builder.require_next(),
+    }
+}
+
 /// Takes the poses of the journal since the last keyframe again. Returns the first one that lacks
 /// its keyframe, if there is one.
 fn recover(
@@ -102,22 +129,42 @@ fn recover(
     newest: Option<&Keyframe>,
     poses: u64,
 ) -> Result<(KeyframeBuilder, Option<u64>), LogError> {
+    let commands = Commands::open(out).map_err(unreadable)?;
+    // Without keyframes, a command may have cut them off: none of the poses before it has one.
+    let of_map = match newest {
+        Some(_) => 0,
+        None => commands.last(is_new_map),
+    };
     let mut builder = KeyframeBuilder::default();
+    let mut before = of_map;
     let last = newest.map_or(0, |keyframe| keyframe.seq);
     let records = crate::poses_from(out, last)?;
     // Behind them may be the leftovers of others after a power failure, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
     for pose in records.take(count) {
         let pose = pose?;
-        let seq = pose.item.seq;
+        let (seq, known) = (pose.item.seq, pose.item.commands);
+        if known < of_map {
+            continue;
+        }
+        let is_first = newest.is_some_and(|newest| newest.seq == seq);
+        if !is_first {
+            let new = commands.between(before, known);
+            new.for_each(|command| obey(&mut builder, command));
+        }
+        before = known;
         match newest {
             // The pose of the journal, since the keyframe's yaw is rounded differently.
-            Some(newest) if newest.seq == seq => builder.resume(&pose.pose(), newest.path_m),
+            Some(newest) if is_first => builder.resume(&pose.pose(), newest.path_m),
             _ if builder.next(&scan_pose(&pose)).is_some() => return Ok((builder, Some(seq))),
             _ => {}
         }
     }
     Ok((builder, None))
+}
+
+fn unreadable(error: CommandError) -> LogError {
+    LogError::Missing(error.to_string())
 }
 
 fn scan_pose(pose: &PoseHeader) -> ScanPose {

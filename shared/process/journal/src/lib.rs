@@ -19,7 +19,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_contract::{PoseHeader, flag};
+use gyre_contract::{Command, PoseHeader, flag};
 use gyre_geometry::SparsePoint;
 use gyre_storage::{GroupSync, LogError, RecordLog, RecordReader, records_path};
 
@@ -35,6 +35,11 @@ pub struct Journal(RecordLog<PoseHeader>);
 pub trait PoseLog {
     /// Takes the next pose, before it is journalled. Returns whether it was appended.
     fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<bool, LogError>;
+
+    /// Applies a command from the next pose on.
+    fn obey(&mut self, _command: &Command) -> Result<(), LogError> {
+        Ok(())
+    }
 
     /// Marks the end of the stream, before the journal does. All records survive a power failure
     /// when this returns.

@@ -3,7 +3,7 @@
 use std::{env, path::Path, process};
 
 use gyre_contract::{
-    StageId,
+    Command, Commands, StageId,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
 };
 use gyre_stage::{schedule, sink};
@@ -69,9 +69,31 @@ impl Supervisor<'_> {
                 }
                 Request::Restart { process } => self.restart_on_request(&process, client)?,
                 Request::Swap(swap) => self.begin_swap(&swap, client)?,
+                Request::Command(command) => client.answer(&match self.number(command) {
+                    Ok(number) => Answer::Numbered(number),
+                    Err(reason) => Answer::Refused(reason),
+                }),
             }
         }
         Ok(stop)
+    }
+
+    /// Keeps a command for masking, which applies it to the next scan, and returns its number.
+    fn number(&self, command: Command) -> Result<u64, String> {
+        let manifest = &self.run.plan.manifest;
+        let missing = match command {
+            Command::Reset { keep_map: true, .. } => (!manifest.window.slam)
+                .then_some("the run has no map to keep: that needs slam.kind"),
+            Command::Locate { .. } => (!manifest.window.localises)
+                .then_some("the run localises in no map: that needs slam.map, with slam.kind"),
+            Command::Reset { .. } => None,
+        };
+        if let Some(missing) = missing {
+            return Err(missing.to_owned());
+        }
+        command.check()?;
+        let added = Commands::open(&manifest.out).and_then(|mut commands| commands.add(command));
+        added.map_err(|error| error.to_string())
     }
 
     fn refuse_unknown(&self, process: &str, client: Client) {

@@ -25,6 +25,9 @@ pub struct Counts {
     pub missing: u64,
     /// Places where the chain of motions restarts, after the first.
     pub breaks: u64,
+    /// Commands that have changed poses; `None`: the run has had none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub commands: Option<u64>,
     /// `None`: no scan has lost azimuths, or they were not looked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost: Option<LostCounts>,
@@ -162,6 +165,7 @@ impl Counter {
             unreadable: seen.saturating_sub(published),
             missing: self.gaps.missing(),
             breaks: self.starts.saturating_sub(1),
+            commands: last.map(|last| last.commands).filter(|it| *it > 0),
             lost: (self.lost.scans > 0).then_some(self.lost),
             motions: refines.then_some(self.motions),
             sensors: self.sensors.counts(),

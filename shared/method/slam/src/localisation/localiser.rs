@@ -131,6 +131,15 @@ impl Localiser {
         self.track = None;
     }
 
+    /// Takes the pose of the next scan from elsewhere, with its covariance: the scan is only aligned
+    /// near it.
+    pub fn place(&mut self, pose: UncertainMotion, stamp_ns: i64) {
+        self.track = Some(Track {
+            pose,
+            fixed_ns: stamp_ns,
+        });
+    }
+
     pub fn locate(&mut self, observation: &Observation<'_>) -> Localisation {
         match self.track {
             None => self.start(observation),

@@ -1,0 +1,364 @@
+//! Commands that change the poses of a run from a scan on. With the scans they are the inputs of a
+//! run: each is kept in `journal/commands.jsonl` with the time of the scan from which it applies, so
+//! that a resumed run computes the same poses, and so does another run that has the file as its
+//! `source.commands`.
+//!
+//! The supervisor appends a command. Masking, which numbers the scans, appends the time of the next
+//! scan, before it publishes that scan with the number of commands that apply to it
+//! ([`Item::commands`](crate::Item)).
+
+use std::{
+    fs::{self, OpenOptions},
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use gyre_geometry::{UncertainMotion, covariance, pose};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::wire::REACH_M;
+
+const FILE: &str = "journal/commands.jsonl";
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Command {
+    /// Begin a new chain of motions at a pose of the odometry. With `keep_map` SLAM continues its
+    /// map: the pose is a measurement of its deviations. Without it SLAM begins a new map there.
+    Reset { at: GivenPose, keep_map: bool },
+    /// The pose of the vehicle in the map in which the run localises.
+    Locate { at: GivenPose },
+}
+
+/// A pose that a person or another program has given: metres and radians.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GivenPose {
+    pub x_m: f64,
+    pub y_m: f64,
+    pub yaw_rad: f64,
+    /// Standard deviations of x and of y, and of the yaw.
+    pub sigma_m: f64,
+    pub sigma_rad: f64,
+}
+
+/// The deviations are those of a pose that is given by hand in RViz.
+impl Default for GivenPose {
+    fn default() -> Self {
+        Self {
+            x_m: 0.0,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+            sigma_m: 0.5,
+            sigma_rad: std::f64::consts::PI / 12.0,
+        }
+    }
+}
+
+impl GivenPose {
+    pub fn pose(&self) -> UncertainMotion {
+        let [place, yaw] = [self.sigma_m, self.sigma_rad].map(|sigma| sigma.powi(2));
+        UncertainMotion {
+            motion: pose(self.x_m, self.y_m, self.yaw_rad),
+            covariance: covariance::unpack(&[place, 0.0, 0.0, place, 0.0, yaw]),
+        }
+    }
+
+    fn is_valid(&self) -> bool {
+        let is_place = |m: f64| m.abs() <= REACH_M;
+        let is_deviation = |value: f64| value > 0.0 && value <= REACH_M;
+        is_place(self.x_m)
+            && is_place(self.y_m)
+            && self.yaw_rad.is_finite()
+            && is_deviation(self.sigma_m)
+            && is_deviation(self.sigma_rad)
+    }
+}
+
+impl Command {
+    pub fn given(&self) -> &GivenPose {
+        match self {
+            Self::Reset { at, .. } | Self::Locate { at } => at,
+        }
+    }
+
+    pub fn check(&self) -> Result<(), String> {
+        match self.given().is_valid() {
+            true => Ok(()),
+            false => Err(format!(
+                "a given pose has finite numbers within {REACH_M} m and deviations above 0"
+            )),
+        }
+    }
+}
+
+#[derive(Debug, Error)]
+pub enum CommandError {
+    #[error("{}: {source}", path.display())]
+    File { path: PathBuf, source: io::Error },
+    #[error("{} line {line}: {reason}", path.display())]
+    Line {
+        path: PathBuf,
+        line: usize,
+        reason: String,
+    },
+}
+
+/// A line of the file: a command, or the time from which it applies, or both.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Line {
+    number: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    command: Option<Command>,
+    /// Time of the scan, ns since 1970 on the sensor's clock.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    from_ns: Option<i64>,
+}
+
+/// The commands of a run, in their order; their numbers begin at 1.
+#[derive(Debug)]
+pub struct Commands {
+    path: PathBuf,
+    read_bytes: u64,
+    lines: usize,
+    given: Vec<(Command, Option<i64>)>,
+}
+
+impl Commands {
+    /// Reads the commands of the run that writes to `out`; without the file there are none.
+    pub fn open(out: &Path) -> Result<Self, CommandError> {
+        Self::read(&out.join(FILE))
+    }
+
+    pub fn read(path: &Path) -> Result<Self, CommandError> {
+        let mut commands = Self {
+            path: path.to_owned(),
+            read_bytes: 0,
+            lines: 0,
+            given: Vec::new(),
+        };
+        commands.refresh()?;
+        Ok(commands)
+    }
+
+    pub fn path_in(out: &Path) -> PathBuf {
+        out.join(FILE)
+    }
+
+    /// Returns the number of commands.
+    pub fn len(&self) -> u64 {
+        self.given.len() as u64
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.given.is_empty()
+    }
+
+    /// Returns the time from which a command applies; `None` until that is known.
+    pub fn from_ns(&self, number: u64) -> Option<i64> {
+        let index = usize::try_from(number).ok()?.checked_sub(1)?;
+        self.given.get(index)?.1
+    }
+
+    /// Returns the commands with the numbers after `before` up to `until`.
+    pub fn between(&self, before: u64, until: u64) -> impl Iterator<Item = &Command> {
+        let count = until.saturating_sub(before) as usize;
+        let commands = self.given.iter().skip(before as usize).take(count);
+        commands.map(|(command, _)| command)
+    }
+
+    /// Returns the number of the last command of a kind; 0 without one.
+    pub fn last(&self, is_of_kind: impl Fn(&Command) -> bool) -> u64 {
+        let mut commands = self.given.iter();
+        let index = commands.rposition(|(command, _)| is_of_kind(command));
+        index.map_or(0, |index| index as u64 + 1)
+    }
+
+    /// Reads the lines that others have appended.
+    pub fn refresh(&mut self) -> Result<(), CommandError> {
+        let length = match fs::metadata(&self.path) {
+            Ok(file) => file.len(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(self.failed(error)),
+        };
+        if length == self.read_bytes {
+            return Ok(());
+        }
+        let text = gyre_storage::read_text(&self.path, gyre_storage::SETTINGS);
+        let text = text.map_err(|error| self.failed(error))?;
+        let new = text.get(self.read_bytes as usize..).unwrap_or_default();
+        // A line that is being written is read later.
+        let whole = &new[..new.rfind('\n').map_or(0, |end| end + 1)];
+        for line in whole.lines() {
+            self.lines += 1;
+            self.take(line).map_err(|reason| CommandError::Line {
+                path: self.path.clone(),
+                line: self.lines,
+                reason,
+            })?;
+        }
+        self.read_bytes += whole.len() as u64;
+        Ok(())
+    }
+
+    fn take(&mut self, text: &str) -> Result<(), String> {
+        let line: Line = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let next = self.len() + 1;
+        if let Some(command) = line.command {
+            command.check()?;
+            if line.number != next {
+                return Err(format!("its number is {}, but {next} follows", line.number));
+            }
+            self.given.push((command, None));
+        }
+        if let Some(from_ns) = line.from_ns {
+            let unknown = || format!("a command {} is unknown", line.number);
+            let index = (line.number as usize).checked_sub(1).ok_or_else(unknown)?;
+            let given = self.given.get_mut(index).ok_or_else(unknown)?;
+            // The first one stays: another process may have read it.
+            given.1 = given.1.or(Some(from_ns));
+        }
+        Ok(())
+    }
+
+    /// Appends a command, and returns its number.
+    pub fn add(&mut self, command: Command) -> Result<u64, CommandError> {
+        self.refresh()?;
+        let number = self.len() + 1;
+        self.append(&Line {
+            number,
+            command: Some(command),
+            from_ns: None,
+        })?;
+        Ok(number)
+    }
+
+    /// Returns the number of commands that apply to a scan. Those that have no time yet apply from
+    /// this scan on.
+    pub fn apply(&mut self, stamp_ns: i64) -> Result<u64, CommandError> {
+        self.refresh()?;
+        for number in 1..=self.len() {
+            if self.from_ns(number).is_none() {
+                self.append(&Line {
+                    number,
+                    command: None,
+                    from_ns: Some(stamp_ns),
+                })?;
+            }
+        }
+        Ok(self.applied(stamp_ns))
+    }
+
+    /// Returns the number of commands whose times are up to the time of a scan.
+    pub fn applied(&self, stamp_ns: i64) -> u64 {
+        let apply = |given: &&(Command, Option<i64>)| given.1.is_some_and(|ns| ns <= stamp_ns);
+        self.given.iter().take_while(apply).count() as u64
+    }
+
+    fn append(&mut self, line: &Line) -> Result<(), CommandError> {
+        let mut text = serde_json::to_string(line).map_err(|error| self.failed(error.into()))?;
+        text.push('\n');
+        let mut options = OpenOptions::new();
+        let mut file = options
+            .create(true)
+            .append(true)
+            .open(&self.path)
+            .map_err(|error| self.failed(error))?;
+        // One write, since two processes append.
+        let written = file.write_all(text.as_bytes());
+        written
+            .and_then(|()| file.sync_data())
+            .map_err(|error| self.failed(error))?;
+        self.refresh()
+    }
+
+    fn failed(&self, source: io::Error) -> CommandError {
+        CommandError::File {
+            path: self.path.clone(),
+            source,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RESET: Command = Command::Reset {
+        at: GivenPose {
+            x_m: 3.0,
+            y_m: -1.0,
+            yaw_rad: 0.5,
+            sigma_m: 0.2,
+            sigma_rad: 0.1,
+        },
+        keep_map: true,
+    };
+
+    fn folder() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("journal")).unwrap();
+        folder
+    }
+
+    #[test]
+    fn a_command_applies_from_the_next_scan_on_for_each_process_that_reads_it() {
+        let folder = folder();
+        let [mut supervisor, mut masking] =
+            [(); 2].map(|()| Commands::open(folder.path()).unwrap());
+        assert_eq!(masking.apply(100).unwrap(), 0);
+        assert_eq!(supervisor.add(RESET).unwrap(), 1);
+        assert_eq!(masking.apply(200).unwrap(), 1);
+        let mut restarted = Commands::open(folder.path()).unwrap();
+        assert_eq!(
+            [100, 199, 200].map(|ns| restarted.apply(ns).unwrap()),
+            [0, 0, 1]
+        );
+        supervisor.refresh().unwrap();
+        assert_eq!(supervisor.from_ns(1), Some(200));
+        assert_eq!(supervisor.between(0, 1).collect::<Vec<_>>(), [&RESET]);
+        assert_eq!(supervisor.between(1, 1).count(), 0);
+    }
+
+    #[test]
+    fn a_line_that_is_being_written_is_read_when_it_is_whole() {
+        let folder = folder();
+        let mut commands = Commands::open(folder.path()).unwrap();
+        commands.add(RESET).unwrap();
+        let path = Commands::path_in(folder.path());
+        let whole = fs::read_to_string(&path).unwrap();
+        fs::write(&path, format!("{whole}{{\"number\":1,\"fr")).unwrap();
+        commands.refresh().unwrap();
+        assert_eq!(commands.from_ns(1), None);
+        fs::write(&path, format!("{whole}{{\"number\":1,\"from_ns\":7}}\n")).unwrap();
+        commands.refresh().unwrap();
+        assert_eq!(commands.from_ns(1), Some(7));
+    }
+
+    #[test]
+    fn an_invalid_line_is_refused_with_its_number() {
+        let folder = folder();
+        let path = Commands::path_in(folder.path());
+        for (line, expected) in [
+            (
+                r#"{"number":2,"command":{"locate":{"at":{}}}}"#,
+                "1 follows",
+            ),
+            (r#"{"number":1,"from_ns":5}"#, "command 1 is unknown"),
+            (
+                r#"{"number":1,"command":{"locate":{"at":{"x_m":1e300}}}}"#,
+                "within",
+            ),
+            (r#"{"number":1,"command":{"leave":{}}}"#, "leave"),
+        ] {
+            fs::write(&path, format!("{line}\n")).unwrap();
+            let refused = Commands::open(folder.path()).unwrap_err().to_string();
+            assert!(
+                refused.contains("line 1") && refused.contains(expected),
+                "{refused}"
+            );
+        }
+    }
+}
