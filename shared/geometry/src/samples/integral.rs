@@ -25,7 +25,7 @@ pub struct Integrator {
 
 /// The integral of a rate from the stamp of one scan to the stamp of the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Integral {
+pub struct Integral {
     pub sum: f64,
     /// From the rate at the first stamp to the rate at the second.
     pub change: f64,
@@ -44,6 +44,18 @@ struct Sweep {
     rates: Vec<Rate>,
     /// Mean rate during the sweep; `None` where samples are missing.
     mean: Option<f64>,
+}
+
+impl Integral {
+    /// Integrates rates between two times; `None` where samples are missing.
+    pub(crate) fn of(rates: &[Rate], stamps_ns: [i64; 2], max_gap_ns: i64) -> Option<Self> {
+        Some(Self {
+            sum: integral(rates, stamps_ns, max_gap_ns)?,
+            change: rate_at(rates, stamps_ns[1])? - rate_at(rates, stamps_ns[0])?,
+            interval_s: seconds(stamps_ns[1] - stamps_ns[0]),
+            samples: rates.len() as u64,
+        })
+    }
 }
 
 impl Integrator {
@@ -108,13 +120,11 @@ impl Integrator {
             let is_later = rates.last().is_none_or(|last| last.0 < rate.0);
             rates.extend(is_later.then_some(*rate));
         }
-        let stamps_ns = [before.stamp_ns, self.stamp_ns()?];
-        Some(Integral {
-            sum: integral(&self.rates, stamps_ns, self.max_gap_ns)?,
-            change: rate_at(&self.rates, stamps_ns[1])? - rate_at(&self.rates, stamps_ns[0])?,
-            interval_s: seconds(stamps_ns[1] - stamps_ns[0]),
-            samples: self.rates.len() as u64,
-        })
+        Integral::of(
+            &self.rates,
+            [before.stamp_ns, self.stamp_ns()?],
+            self.max_gap_ns,
+        )
     }
 }
 
@@ -170,7 +180,7 @@ fn integral(rates: &[Rate], [from_ns, to_ns]: [i64; 2], max_gap_ns: i64) -> Opti
     (is_dense && covers).then_some(sum)
 }
 
-fn rates(samples: &[Sample], kind: SampleKind) -> impl Iterator<Item = Rate> {
+pub(super) fn rates(samples: &[Sample], kind: SampleKind) -> impl Iterator<Item = Rate> {
     let of_kind = samples.iter().filter(move |sample| sample.is(kind));
     of_kind.map(move |sample| (sample.stamp_ns, sample.values[kind.rate()]))
 }
@@ -188,7 +198,7 @@ fn rate_at(rates: &[Rate], stamp_ns: i64) -> Option<f64> {
     Some(before.1 + (after.1 - before.1) * share.clamp(0.0, 1.0))
 }
 
-fn seconds(ns: i64) -> f64 {
+pub(super) fn seconds(ns: i64) -> f64 {
     ns as f64 * 1e-9
 }
 

@@ -9,7 +9,7 @@ use crate::{
     samples::{
         Evidence, Sample, SensorKind, UpAxis,
         config::{on_clock, sensor_config},
-        integral::Integrator,
+        integral::{Integral, Integrator},
     },
 };
 
@@ -77,6 +77,12 @@ impl Default for WheelsConfig {
     }
 }
 
+impl WheelsConfig {
+    fn of_rolling(&self, integral: &Integral) -> f64 {
+        self.noise_m_per_sqrt_m.powi(2) * integral.sum.abs()
+    }
+}
+
 sensor_config! { WheelsConfig is Wheels on "/odom":
     fn scale(&self) -> (f64, f64) {
         (self.scale, 4.0 * self.scale_sigma.max(TYRES))
@@ -113,19 +119,21 @@ sensor_config! { WheelsConfig is Wheels on "/odom":
     /// Returns the distance ahead along the vehicle's path.
     fn measure(&self, between: &Integrator) -> Option<Evidence> {
         let integral = between.integral?;
-        let of_rolling = self.noise_m_per_sqrt_m.powi(2) * integral.sum.abs();
+        Some(Evidence {
+            samples: integral.samples,
+            interval_s: integral.interval_s,
+            value: [integral.sum, 0.0],
+            covariance: [self.variance_of(&integral), 0.0, self.of_rolling(&integral)],
+        })
+    }
+
+    fn variance_of(&self, integral: &Integral) -> f64 {
         // The rounding error of a speed is constant while the speed is constant.
         let by_speed = NOISE_MPS * integral.interval_s;
         let by_time = self.time_sigma_s * integral.change;
         // Both ends are anywhere within a tick.
         let by_ticks_m2 = self.m_per_tick.unwrap_or_default().powi(2) / 6.0;
-        let ahead_m2 = of_rolling + by_speed * by_speed + by_time * by_time + by_ticks_m2;
-        Some(Evidence {
-            samples: integral.samples,
-            interval_s: integral.interval_s,
-            value: [integral.sum, 0.0],
-            covariance: [ahead_m2, 0.0, of_rolling],
-        })
+        self.of_rolling(integral) + by_speed * by_speed + by_time * by_time + by_ticks_m2
     }
 
     /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is

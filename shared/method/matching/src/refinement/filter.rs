@@ -21,10 +21,6 @@ use super::Witnessed;
 /// Square of what another sensor and the radar are apart, over its variance, beyond which one of
 /// them is wrong: four standard deviations.
 pub(super) const GATE: f64 = 16.0;
-/// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s. It is
-/// the residual of the best bias and scale in the turns over 0.5 to 8 s on six simulated roads,
-/// whose gradient is 2.6 % RMS along and across: 5.2e-4 RMS, 2e-4 to 1.1e-3 on single roads.
-const TILT_RAD_PER_SQRT_S: f64 = 5e-4;
 /// Random walk of the scale of wheels and Doppler, /√s: tyres that warm change it by 0.06 % in an
 /// hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
@@ -93,8 +89,6 @@ pub(super) struct SharedErrors {
     scale_walk_per_sqrt_s: f64,
     /// The farthest that a learnt scale can be from 1.
     max_scale_error: f64,
-    /// Noise that the measurement does not state, per √s.
-    noise_per_sqrt_s: f64,
 }
 
 impl SharedErrors {
@@ -107,7 +101,6 @@ impl SharedErrors {
             scale_sigma,
             scale_walk_per_sqrt_s: SCALE_WALK_PER_SQRT_S,
             max_scale_error,
-            noise_per_sqrt_s: 0.0,
         };
         let (wheels, doppler) = (&configs.wheels, &configs.doppler);
         Witness::ALL.map(|kind| match kind {
@@ -126,7 +119,6 @@ impl SharedErrors {
             scale_sigma: config.scale_sigma,
             scale_walk_per_sqrt_s: 0.0,
             max_scale_error: config.max_scale_error(),
-            noise_per_sqrt_s: TILT_RAD_PER_SQRT_S,
         }
     }
 }
@@ -225,9 +217,9 @@ impl Filter {
     }
 
     /// Predicts the coordinate of the next scan.
-    pub(super) fn predict(&self, measured: &Evidence, errors: &SharedErrors) -> Predicted {
+    pub(super) fn predict(&self, measured: &Evidence) -> Predicted {
         let (time_s, value) = (measured.interval_s, measured.value[0]);
-        let noise = measured.covariance[0] + errors.noise_per_sqrt_s.powi(2) * time_s;
+        let noise = measured.covariance[0];
         let mut step = Matrix5::identity();
         (step[(VALUE, BIAS)], step[(VALUE, SCALE)]) = (-time_s, value);
         let mut covariance = step * self.covariance * step.transpose();

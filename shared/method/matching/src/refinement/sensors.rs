@@ -56,10 +56,7 @@ impl Refiner {
             filter.iter_mut().for_each(|it| it.wait(interval_s, errors));
         }
         let filters = &self.state.filters;
-        let predicted = std::array::from_fn(|k| {
-            let (measured, errors) = (measured[k].as_ref()?, &self.errors[k]);
-            Some(filters[k]?.predict(measured, errors))
-        });
+        let predicted = std::array::from_fn(|k| Some(filters[k]?.predict(measured[k].as_ref()?)));
         let predict_turn = || {
             let (predicted, filter, turn) = (predicted[GYRO]?, filters[GYRO]?, measured[GYRO]?);
             let sweep_rate_radps = filter.scale * turn.value[1] - filter.bias;

@@ -73,7 +73,7 @@ impl Drive {
             drift: 0.0,
             jitter: if is_gyro { 2e-3 } else { 0.04 },
             drifts: if is_gyro { 8e-5 } else { 0.02 },
-            noise: if is_gyro { 5e-5 } else { 0.016 },
+            noise: if is_gyro { 2.5e-4 } else { 0.016 },
             guess: if is_gyro { 0.01 } else { 0.3 },
             has_anchor: seed.is_multiple_of(2),
             errors,
@@ -87,8 +87,7 @@ impl Drive {
     /// Drives so far, and returns the measurement.
     fn drive(&mut self, change: f64) -> Evidence {
         self.truth += change;
-        let noise = self.errors.noise_per_sqrt_s.powi(2) * INTERVAL_S + self.noise.powi(2);
-        let off = self.bias * INTERVAL_S + self.normal(noise.sqrt());
+        let off = self.bias * INTERVAL_S + self.normal(self.noise);
         Evidence {
             samples: 1,
             interval_s: INTERVAL_S,
@@ -100,7 +99,7 @@ impl Drive {
     fn predict(&mut self, measured: &Evidence) -> Predicted {
         self.filter.wait(INTERVAL_S, &self.errors);
         self.bias += self.normal(self.errors.bias_walk_per_sqrt_s * INTERVAL_S.sqrt());
-        self.filter.predict(measured, &self.errors)
+        self.filter.predict(measured)
     }
 
     fn register(&mut self) -> Seen {
