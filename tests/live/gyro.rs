@@ -9,11 +9,14 @@ use std::{
     time::Duration,
 };
 
+use gyre_datasets::read_trajectory;
+use gyre_geometry::{interpolate, pose};
+use serde_json::Value;
 use tempfile::TempDir;
 
 use super::radar::{Radar, complete};
 use crate::{
-    common::{Run, recording},
+    common::{Run, finished, recording},
     observers::record::{file, recorded, replay},
 };
 
@@ -91,6 +94,47 @@ fn a_live_gyro_and_wheels_give_the_motions_of_their_logs_and_the_recording_repla
     run.assert_counts("dropped=0 gyro/motions=11 wheels/motions=11");
     assert!(live == expected, "{live}\n{expected}");
     assert_eq!(replay(&file(&run), &[]), expected);
+}
+
+#[test]
+fn between_the_scans_poses_are_predicted_at_their_rate_and_lead_to_the_next_pose() {
+    let whole = with_log();
+    let listen = address(3);
+    let radar = Radar::playing(whole.path(), &[]);
+    let run = radar.run(SCANS).sets(&format!(
+        "gyro.kind=udp gyro.listen='{listen}' run.window=32 run.predict_hz=50"
+    ));
+    let log = fs::read_to_string(whole.path().join("imu.csv")).unwrap();
+    let gyro = sending(lines_of(&log), listen, 1);
+    let running = run.started(3);
+    let echoed = finished!["echo", run.out(), "predicted_pose", "--json"];
+    running.finish().succeeded();
+    gyro.join().unwrap();
+    let message = |line: &str| serde_json::from_str::<Value>(line).unwrap();
+    let messages: Vec<Value> = echoed.succeeded().stdout.lines().map(message).collect();
+    // Of the two seconds that are left.
+    assert!(messages.len() > 40, "{}", messages.len());
+    let poses = read_trajectory(&run.out().join("trajectory.tum")).unwrap();
+    let stamps = poses.stamp_ns.unwrap();
+    for pair in messages.windows(2) {
+        let [before, message] = [0, 1].map(|k| pair[k]["item"]["seq"].as_u64().unwrap());
+        assert_eq!(message, before + 1);
+    }
+    let mut compared = 0;
+    for message in &messages {
+        let number = |key: &str| message[key].as_f64().unwrap();
+        let at_ns = message["item"]["stamp_ns"].as_i64().unwrap();
+        let next = stamps.partition_point(|ns| *ns <= at_ns);
+        let (Some(from), Some(to)) = (poses.poses.get(next - 1), poses.poses.get(next)) else {
+            continue;
+        };
+        let share = (at_ns - stamps[next - 1]) as f64 / (stamps[next] - stamps[next - 1]) as f64;
+        let expected = interpolate(from, to, share);
+        let apart = expected.inv_mul(&pose(number("x_m"), number("y_m"), number("yaw_rad")));
+        assert!(apart.translation.vector.norm() < 0.3, "{at_ns}: {apart}");
+        compared += 1;
+    }
+    assert!(compared > 30, "{compared}");
 }
 
 #[test]

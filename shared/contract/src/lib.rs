@@ -18,6 +18,7 @@ mod message;
 mod motion;
 mod object;
 mod pose;
+mod predicted_pose;
 mod refinement;
 pub mod run;
 mod sample_rates;
@@ -42,11 +43,12 @@ pub use message::{ByteBlock, Element, FloatBlock, Header, Message, Sender, Topic
 pub use motion::{MotionEstimate, MotionHeader, RotationEstimate, RotationHeader};
 pub use object::{Drawing, MAX_LISTED, Object, ObjectsHeader};
 pub use pose::{PoseHeader, compose};
+pub use predicted_pose::PredictedPoseHeader;
 pub use refinement::{RefinementRecord, WitnessRecord, initial_guess, outcome, verdict};
 pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::ScanHeader;
 pub use stages::{StageTopics, composed};
 pub use topics::{
     Correction, Fix, Footprint, GivenAnew, Gnss, Intake, Loop, Masked, Motion, NumberedBy, Objects,
-    Pose, Refined, Rotation, Scan, all, named as topic_named, topic, topics,
+    Pose, PredictedPose, Refined, Rotation, Scan, all, named as topic_named, topic, topics,
 };

@@ -15,6 +15,7 @@ use crate::{
     motion::{MotionHeader, RotationHeader},
     object::ObjectsHeader,
     pose::PoseHeader,
+    predicted_pose::PredictedPoseHeader,
     scan::ScanHeader,
 };
 
@@ -135,6 +136,12 @@ topics! {
         PoseHeader, FloatBlock, by Sender::Stage(&[StageId::PoseIntegration]),
         for ["radar-replay", "masking", "supervisor"], Feedback,
         is [Recorded Linked]
+    }
+    /// The pose between scans: predicted from the last pose to the time when it is published, in a
+    /// run of a live radar with `run.predict_hz`.
+    PredictedPose = "predicted_pose" {
+        PredictedPoseHeader, FloatBlock, by Sender::Stage(&[StageId::RadarReplay]), for [], Latest,
+        is []
     }
     /// An accepted loop between two keyframes.
     Loop = "loop" {
@@ -293,14 +300,14 @@ mod tests {
         let names = |window| topics(window).map(|topic| topic.name).collect::<Vec<_>>();
         let (mut slam, mut with_objects) = (WINDOW, WINDOW);
         (slam.slam, with_objects.objects) = (true, true);
-        assert_eq!(names(&WINDOW).last(), Some(&"pose"));
-        assert_eq!(names(&slam)[8..], ["loop", "correction"]);
+        assert_eq!(names(&WINDOW).last(), Some(&"predicted_pose"));
+        assert_eq!(names(&slam)[9..], ["loop", "correction"]);
         let with_map = Window {
             localises: true,
             ..slam
         };
-        assert_eq!(names(&with_map)[8..], ["loop", "correction", "fix"]);
-        assert_eq!(names(&with_objects)[8..], ["objects"]);
+        assert_eq!(names(&with_map)[9..], ["loop", "correction", "fix"]);
+        assert_eq!(names(&with_objects)[9..], ["objects"]);
         assert_eq!(Masked::sizes(&with_objects), Masked::sizes(&slam));
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();
         assert_eq!(added, 3);

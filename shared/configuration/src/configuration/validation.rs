@@ -183,6 +183,10 @@ impl Configuration {
                 "faults are put into the scans of a recording or a simulation, which this run does not play: remove them";
             "source" if source.commands.is_some() && source.from != PlayedFrom::Scan =>
                 "commands need masking, whose place `from` takes: remove one of them";
+            "run" if !(0.0..=200.0).contains(&run.predict_hz) =>
+                "predict_hz must be 0 to 200";
+            "run" if run.predict_hz > 0.0 && !is_radar =>
+                "predict_hz is for the poses between the scans of a live radar (source.kind), which this run does not have";
             "run" if is_live && run.rate == Rate::Max && has_scans =>
                 "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
         }

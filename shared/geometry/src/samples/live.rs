@@ -70,6 +70,12 @@ impl LiveSamples {
         }
     }
 
+    /// Returns the samples from the last one up to `ns` on.
+    pub fn since(&self, ns: i64) -> &[Sample] {
+        let after = self.samples.partition_point(|it| it.stamp_ns <= ns);
+        &self.samples[after.saturating_sub(1)..]
+    }
+
     /// Returns whether no sample of a scan that ends then can be missing, unless samples overtake
     /// each other.
     pub fn cover(&self, until_ns: i64) -> bool {

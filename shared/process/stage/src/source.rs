@@ -8,6 +8,7 @@ mod pace;
 mod playback;
 mod player;
 mod position;
+mod predictions;
 
 mod sensor;
 

@@ -2,7 +2,7 @@
 
 use std::{mem, os::fd::BorrowedFd, time::Duration};
 
-use gyre_contract::{Hop, Item, Pose, Scan, StageId, flag, run::StageCounters};
+use gyre_contract::{Hop, Item, Pose, PoseHeader, Scan, StageId, flag, run::StageCounters};
 use gyre_transport::{
     Listener, RunError, clock,
     reader::{Port, Received},
@@ -180,7 +180,9 @@ pub(crate) fn hop(started_ns: i64, finished_ns: i64) -> Hop {
 pub struct Credit {
     pub poses: Port<Pose>,
     pub newest: Option<u64>,
-    /// The same at the source.
+    /// The newest pose that was taken.
+    pub last: Option<PoseHeader>,
+    /// The number of the newest pose at the source.
     pub published: Option<u64>,
     /// The newest pose of the trajectory at the last start of the sink.
     pub resume_at: Option<Item>,
@@ -192,6 +194,7 @@ impl Credit {
         Ok(Self {
             poses: launch.port()?,
             newest: None,
+            last: None,
             published: None,
             resume_at: None,
             has_ended: false,
@@ -215,6 +218,7 @@ impl Credit {
         }
         if !item.is(flag::BASE) && !item.is(flag::END) {
             self.newest = self.newest.max(Some(item.seq));
+            self.last = Some(*pose.header());
             self.published = self.published.max(Some(item.published));
         }
         Ok(Some(pose))

@@ -67,6 +67,14 @@ impl LiveSensors {
         Ok(())
     }
 
+    /// Returns the samples that are here from the last ones up to `ns` on, in the order of their stamps.
+    pub fn since(&self, ns: i64) -> Vec<Sample> {
+        let all = self.sensors.iter();
+        let mut samples: Vec<Sample> = all.flat_map(|it| it.samples.since(ns)).copied().collect();
+        samples.sort_unstable_by_key(Sample::order);
+        samples
+    }
+
     pub fn cover(&self, header: &ScanHeader) -> bool {
         let until_ns = header.span_ns()[1];
         self.sensors.iter().all(|live| live.samples.cover(until_ns))

@@ -15,7 +15,7 @@ use gyre_transport::{
     writer::{Draft, Writer},
 };
 
-use super::{Feed, hop, live_samples::LiveSensors, position::Position};
+use super::{Feed, hop, live_samples::LiveSensors, position::Position, predictions::Predictions};
 use crate::{Launch, counters::Work};
 
 /// A sensor that delivers scans at its own pace.
@@ -81,6 +81,7 @@ pub fn run_sensor(
     let mut stream = Stream {
         received: received::open(&launch.manifest)?,
         live: LiveSensors::open(launch)?,
+        predictions: Predictions::open(launch)?,
         intake: Writer::open(&launch.node, &launch.manifest)?,
         feed: Feed::of_scans(launch)?.never_late(),
     };
@@ -91,11 +92,23 @@ pub fn run_sensor(
     stream.feed.finish(ended)
 }
 
+/// What ends a sleep, besides its time and the signals.
+#[derive(Clone, Copy)]
+enum Wait {
+    Time,
+    /// Data of the sensor.
+    Data,
+    /// Samples of the sensors beside it.
+    Samples,
+}
+
 struct Stream<'a> {
     feed: Feed<'a, Scan>,
     intake: Writer<Intake>,
     received: Numbers<9>,
     live: Option<LiveSensors>,
+    /// `None`: the run predicts no poses.
+    predictions: Option<Predictions>,
 }
 
 impl Stream<'_> {
@@ -119,13 +132,15 @@ impl Stream<'_> {
             self.feed.schedule.has_published(position.published)?;
             let (item, received) = (*item, sensor.received());
             self.received.write(received.to_numbers())?;
+            if let Some(predictions) = &mut self.predictions {
+                predictions.set_clock(draft.header().span_ns()[1], item.due_ns);
+            }
             self.feed.scans().send(draft, S::HOP)?;
             self.intake
                 .publish(IntakeHeader::of(item, &received), Some(S::HOP))?;
             position.advance();
             // However fast scans come, there is time for signals and for new readers.
-            self.feed
-                .sleep_until(None, sensor.connection(), Duration::ZERO)?;
+            self.sleep(sensor, Wait::Data, Duration::ZERO)?;
         }
         let mut end = position.item();
         generation.mark(&mut end);
@@ -153,9 +168,9 @@ impl Stream<'_> {
                 }
                 Arrival::Nothing(limit) => {
                     self.received.write(sensor.received().to_numbers())?;
-                    self.feed.sleep_until(None, sensor.connection(), limit)?;
+                    self.sleep(sensor, Wait::Data, limit)?;
                 }
-                Arrival::Later(time) => self.feed.sleep(time)?,
+                Arrival::Later(time) => self.sleep(sensor, Wait::Time, time)?,
             }
         }
     }
@@ -165,21 +180,50 @@ impl Stream<'_> {
         sensor: &mut impl Sensor,
         draft: &mut Draft<Scan>,
     ) -> Result<(), RunError> {
-        let Some(live) = &mut self.live else {
+        let Some(live) = &self.live else {
             return Ok(());
         };
         let until_ns = clock::now_ns() + live.max_wait.as_nanos() as i64;
-        loop {
+        while let Some(live) = &mut self.live {
             live.receive(sensor)?;
             let left = clock::until(until_ns);
             if live.cover(draft.header()) || left.is_zero() {
+                let (header, bytes) = draft.parts();
+                live.store(header, bytes);
                 break;
             }
-            let sockets = live.sockets().chain(sensor.samples());
-            self.feed.sleep_until(None, sockets, left)?;
+            self.sleep(sensor, Wait::Samples, left)?;
         }
-        let (header, bytes) = draft.parts();
-        live.store(header, bytes);
         Ok(())
+    }
+
+    /// Sleeps, and publishes the predictions that become due meanwhile.
+    fn sleep(
+        &mut self,
+        sensor: &mut impl Sensor,
+        wait: Wait,
+        limit: Duration,
+    ) -> Result<(), RunError> {
+        let due = self.predictions.as_ref().map(Predictions::until_due);
+        let limit = due.map_or(limit, |due| due.min(limit));
+        let feed = &mut self.feed;
+        match (wait, &self.live) {
+            (Wait::Time, _) => feed.sleep(limit)?,
+            (Wait::Data, _) => feed.sleep_until(None, sensor.connection(), limit)?,
+            (Wait::Samples, live) => {
+                let sockets = live.iter().flat_map(LiveSensors::sockets);
+                feed.sleep_until(None, sockets.chain(sensor.samples()), limit)?;
+            }
+        }
+        let Some(predictions) = &mut self.predictions else {
+            return Ok(());
+        };
+        feed.credit.update()?;
+        if let Some(live) = &mut self.live {
+            live.receive(sensor)?;
+        }
+        let live = &self.live;
+        let samples = |ns| live.as_ref().map_or(Vec::new(), |live| live.since(ns));
+        predictions.publish_due(&feed.credit, samples)
     }
 }
