@@ -1,6 +1,7 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each
-//! pose before it is published. A reset by a command begins at its pose. With SLAM it logs keyframes, with objects each scan. In live mode
-//! poses continue when the disk is full, and are not kept from then on.
+//! pose before it is published. A reset by a command begins at its pose. With SLAM it logs
+//! keyframes, with objects each scan. In live mode poses continue when the disk is full, and are
+//! not kept from then on.
 
 use gyre_contract::{
     Command, Commands, Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag,

@@ -1,6 +1,6 @@
 //! Commands that change the poses of a run from a scan on. With the scans they are the inputs of a
-//! run: each is kept in `journal/commands.jsonl` with the time of the scan from which it applies, so
-//! that a resumed run computes the same poses, and so does another run that has the file as its
+//! run: each is kept in `journal/commands.jsonl` with the time of the scan from which it applies,
+//! so that a resumed run computes the same poses, and so does another run that has the file as its
 //! `source.commands`.
 //!
 //! The supervisor appends a command. Masking, which numbers the scans, appends the time of the next

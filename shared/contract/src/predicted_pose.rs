@@ -15,8 +15,8 @@ use crate::{
 };
 
 wire! {
-    /// A pose that is predicted from the last one by gyro, wheels and the last velocity, in the same
-    /// frame.
+    /// A pose that is predicted from the last one by gyro, wheels and the last velocity, in the
+    /// same frame.
     pub struct PredictedPoseHeader = "gyre_predicted_pose_header_v1" {
         /// `seq` counts the predictions of the run, from 0; `stamp_ns` is the time of this one on
         /// the sensor's clock, `scan` the scan of the last pose.

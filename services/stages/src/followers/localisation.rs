@@ -1,6 +1,6 @@
 //! Localisation of a run in the map of an earlier drive: follows `journal/keyframes.log`, and
-//! publishes each place as a `fix`. Its fixes depend only on the keyframes, the map, and the commands
-//! that give a place.
+//! publishes each place as a `fix`. Its fixes depend only on the keyframes, the map, and the
+//! commands that give a place.
 
 use gyre_contract::{Command, Commands, Fix, FixHeader, Item, fix_status, run::StageCounters};
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};

@@ -19,8 +19,9 @@ impl AppliedCommands {
     }
 
     /// Writes the number of commands that apply to a scan into its item, and starts a chain of
-    /// motions there if one of them is new and resets the run. `resume_at` is the item of the newest
-    /// pose at the last start of the sink: nothing of it or of earlier scans changes any more.
+    /// motions there if one of them is new and resets the run. `resume_at` is the item of the
+    /// newest pose at the last start of the sink: nothing of it or of earlier scans changes any
+    /// more.
     pub fn mark(&mut self, item: &Item, resume_at: &Item) -> Result<Item, RunError> {
         if let Some(last) = self.last.filter(|last| last.seq == item.seq) {
             return Ok(last);

@@ -22,8 +22,8 @@ pub struct RunConfig {
     /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live
     /// mode needs another than `max`.
     pub rate: Rate,
-    /// Poses between the scans of a live radar, on the topic `predicted_pose`: number per second, at
-    /// most 200. 0: none.
+    /// Poses between the scans of a live radar, on the topic `predicted_pose`: number per second,
+    /// at most 200. 0: none.
     pub predict_hz: f64,
     /// Room for programs that look on, 0 to 64 of each topic: `gyre watch`, a viewer, a recorder.
     /// They change neither a result nor a latency. Each needs shared memory for one message of each

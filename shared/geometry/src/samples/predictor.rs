@@ -27,7 +27,7 @@ pub struct PredictionStart {
     pub twist: Twist,
     pub interval_s: f64,
     pub covariance: Matrix3<f64>,
-    /// What is known of the errors of gyro and wheels; `None` of a sensor that is not used.
+    /// The learnt errors of gyro and wheels; `None` of a sensor that is not used.
     pub gyro: Option<LearntErrors>,
     pub wheels: Option<LearntErrors>,
 }

@@ -131,8 +131,8 @@ impl Localiser {
         self.track = None;
     }
 
-    /// Takes the pose of the next scan from elsewhere, with its covariance: the scan is only aligned
-    /// near it.
+    /// Takes the pose of the next scan from elsewhere, with its covariance: the scan is only
+    /// aligned near it.
     pub fn place(&mut self, pose: UncertainMotion, stamp_ns: i64) {
         self.track = Some(Track {
             pose,

@@ -67,7 +67,8 @@ impl LiveSensors {
         Ok(())
     }
 
-    /// Returns the samples that are here from the last ones up to `ns` on, in the order of their stamps.
+    /// Returns the samples that are here from the last ones up to `ns` on, in the order of their
+    /// stamps.
     pub fn since(&self, ns: i64) -> Vec<Sample> {
         let all = self.sensors.iter();
         let mut samples: Vec<Sample> = all.flat_map(|it| it.samples.since(ns)).copied().collect();

@@ -92,7 +92,7 @@ pub fn run_sensor(
     stream.feed.finish(ended)
 }
 
-/// What ends a sleep, besides its time and the signals.
+/// The event that ends a sleep, besides its time and the signals.
 #[derive(Clone, Copy)]
 enum Wait {
     Time,
