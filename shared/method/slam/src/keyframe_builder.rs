@@ -187,6 +187,27 @@ mod tests {
     }
 
     #[test]
+    fn a_given_pose_is_a_keyframe_with_its_deviation_far_along_the_path() {
+        let mut builder = KeyframeBuilder::default();
+        let scans = scans(3);
+        builder.next(&scans[0]);
+        builder.require_next();
+        let required = builder.next(&scans[1]).unwrap();
+        assert_eq!(required.motion.motion, scans[1].motion.motion);
+        let covariance = Matrix3::from_diagonal_element(0.25);
+        builder.give_next(covariance);
+        let mut given = scans[2];
+        (given.pose.motion, given.motion) = (pose(9.0, 9.0, 1.0), OdometryMotion::default());
+        let keyframe = builder.next(&given).unwrap();
+        let apart = required.pose.motion * keyframe.motion.motion;
+        let apart = apart.inv_mul(&given.pose.motion);
+        assert!(apart.translation.vector.norm() < 1e-12 && apart.rotation.angle().abs() < 1e-12);
+        assert_eq!(keyframe.motion.covariance, covariance);
+        assert_eq!(keyframe.path_m, required.path_m + PATH_TO_GIVEN_M);
+        assert!(builder.next(&given).is_none(), "once");
+    }
+
+    #[test]
     fn a_builder_that_continues_after_a_keyframe_makes_the_same_ones() {
         let scans = scans(9);
         let mut builder = KeyframeBuilder::default();

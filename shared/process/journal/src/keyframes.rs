@@ -177,3 +177,63 @@ fn scan_pose(pose: &PoseHeader) -> ScanPose {
         interval_s: pose.motion.interval_ns as f64 * 1e-9,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gyre_contract::{GivenPose, Item};
+
+    use super::*;
+    use crate::Journal;
+
+    /// A pose every 3 m: each becomes a keyframe.
+    fn pose(seq: u64, commands: u64) -> PoseHeader {
+        PoseHeader {
+            item: Item {
+                commands,
+                ..Item::recorded(seq, seq, seq as i64)
+            },
+            x_m: 3.0 * seq as f64,
+            ..PoseHeader::default()
+        }
+    }
+
+    fn reset(keep_map: bool) -> Command {
+        let at = GivenPose::default();
+        Command::Reset { at, keep_map }
+    }
+
+    /// Whatever of the reset a kill leaves behind, the keyframes are those of the new map.
+    #[test]
+    fn a_new_map_has_the_keyframes_since_its_reset_also_after_a_kill() {
+        for journalled in [4, 5] {
+            let folder = tempfile::tempdir().unwrap();
+            let out = folder.path();
+            let mut journal = Journal::open(out).unwrap();
+            let mut keyframes = Keyframes::open(out, 0, false, 1).unwrap();
+            for seq in 0..4 {
+                keyframes.add(&pose(seq, 0), &[]).unwrap();
+                journal.append(&pose(seq, 0)).unwrap();
+            }
+            let mut commands = Commands::open(out).unwrap();
+            commands.add(reset(false)).unwrap();
+            commands.apply(4).unwrap();
+            keyframes.obey(&reset(false)).unwrap();
+            keyframes.add(&pose(4, 1), &[]).unwrap();
+            if journalled > 4 {
+                journal.append(&pose(4, 1)).unwrap();
+            }
+            drop((keyframes, journal));
+            assert_eq!(complete_poses(out, journalled).unwrap(), journalled);
+            let mut resumed = Keyframes::open(out, journalled, false, 1).unwrap();
+            if journalled == 4 {
+                resumed.obey(&reset(false)).unwrap();
+                resumed.add(&pose(4, 1), &[]).unwrap();
+            }
+            resumed.add(&pose(5, 1), &[]).unwrap();
+            let mut log = RecordReader::<Keyframe>::open(out).unwrap();
+            let keyframes = (0..log.len()).map(|index| log.read(index).unwrap());
+            let places: Vec<_> = keyframes.map(|it| (it.seq, it.path_m)).collect();
+            assert_eq!(places, [(4, 0.0), (5, 3.0)], "{journalled}");
+        }
+    }
+}
