@@ -10,6 +10,7 @@
 use std::{
     fs::{self, OpenOptions},
     io::{self, Write},
+    mem,
     path::{Path, PathBuf},
 };
 
@@ -279,6 +280,39 @@ impl Commands {
             path: self.path.clone(),
             source,
         }
+    }
+}
+
+/// Reads the commands of a run along its scans, as a follower does.
+#[derive(Debug)]
+pub struct CommandsOfScans {
+    commands: Commands,
+    /// Number of commands that applied to the scan before.
+    before: u64,
+}
+
+impl CommandsOfScans {
+    pub fn open(out: &Path) -> Result<Self, CommandError> {
+        Ok(Self {
+            commands: Commands::open(out)?,
+            before: 0,
+        })
+    }
+
+    /// Begins again with the first scan.
+    pub fn restart(&mut self) {
+        self.before = 0;
+    }
+
+    /// Returns the commands that are new with the next scan, of this time, ns.
+    pub fn of_scan(
+        &mut self,
+        stamp_ns: i64,
+    ) -> Result<impl Iterator<Item = &Command>, CommandError> {
+        self.commands.refresh()?;
+        let apply = self.commands.applied(stamp_ns).max(self.before);
+        let before = mem::replace(&mut self.before, apply);
+        Ok(self.commands.between(before, apply))
     }
 }
 

@@ -28,7 +28,7 @@ mod topics;
 pub mod wire;
 
 pub use basis::{Basis, WitnessCounts};
-pub use command::{Command, CommandError, Commands, GivenPose};
+pub use command::{Command, CommandError, Commands, CommandsOfScans, GivenPose};
 pub use follower::{CorrectionHeader, FixHeader, LoopHeader, fix_status};
 pub use gnss::GnssHeader;
 pub use gyre_geometry::{

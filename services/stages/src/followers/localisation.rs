@@ -2,7 +2,9 @@
 //! publishes each place as a `fix`. Its fixes depend only on the keyframes, the map, and the
 //! commands that give a place.
 
-use gyre_contract::{Command, Commands, Fix, FixHeader, Item, fix_status, run::StageCounters};
+use gyre_contract::{
+    Command, CommandsOfScans, Fix, FixHeader, Item, fix_status, run::StageCounters,
+};
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_matching::RefinementConfig;
 use gyre_radar::points::PointsConfig;
@@ -26,8 +28,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let mut places = Fixes {
         keyframes: RecordReader::open(&launch.manifest.out)?,
         localiser: localiser.map_err(RunError::input)?,
-        commands: Commands::open(&launch.manifest.out).map_err(RunError::input)?,
-        obeyed: 0,
+        commands: CommandsOfScans::open(&launch.manifest.out).map_err(RunError::input)?,
         read: 0,
     };
     follower::run(launch, &mut places)
@@ -36,9 +37,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
 struct Fixes {
     keyframes: RecordReader<Keyframe>,
     localiser: Localiser,
-    commands: Commands,
-    /// Number of commands that applied to the keyframe before.
-    obeyed: u64,
+    commands: CommandsOfScans,
     read: usize,
 }
 
@@ -49,7 +48,8 @@ impl Fixes {
         self.keyframes.refresh()?;
         if self.keyframes.unchanged() < self.read {
             self.localiser.reset();
-            (self.read, self.obeyed) = (0, 0);
+            self.commands.restart();
+            self.read = 0;
         }
         Ok(())
     }
@@ -74,16 +74,12 @@ impl Fixes {
 
     /// Returns the place that a command has given since the keyframe before.
     fn given(&mut self, stamp_ns: i64) -> Result<Option<UncertainMotion>, RunError> {
-        self.commands.refresh().map_err(RunError::input)?;
-        let apply = self.commands.applied(stamp_ns).max(self.obeyed);
-        let new = self.commands.between(self.obeyed, apply);
+        let new = self.commands.of_scan(stamp_ns).map_err(RunError::input)?;
         let places = new.filter_map(|command| match command {
             Command::Locate { at } => Some(at.pose()),
             Command::Reset { .. } => None,
         });
-        let place = places.last();
-        self.obeyed = apply;
-        Ok(place)
+        Ok(places.last())
     }
 }
 

@@ -2,7 +2,9 @@
 //! `journal/objects.log`. A restarted process works through the scans from the first one, since an
 //! identity can be as old as the run, and appends the records that the log lacks.
 
-use gyre_contract::{Item, MAX_LISTED, Object, Objects, ObjectsHeader, run::StageCounters};
+use gyre_contract::{
+    Command, CommandsOfScans, Item, MAX_LISTED, Object, Objects, ObjectsHeader, run::StageCounters,
+};
 use gyre_geometry::xy_yaw;
 use gyre_journal::{objects::LoggedObjects, scans::LoggedScan};
 use gyre_masking::MaskingConfig;
@@ -23,6 +25,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
         scans: RecordReader::open(out)?,
         tracked: RecordLog::open(out)?,
         tracker: tracker(&masking)?,
+        commands: CommandsOfScans::open(out).map_err(RunError::input)?,
         masking,
         read: 0,
     };
@@ -43,6 +46,7 @@ struct Tracking {
     scans: RecordReader<LoggedScan>,
     tracked: RecordLog<LoggedObjects>,
     tracker: ObjectTracker,
+    commands: CommandsOfScans,
     read: usize,
 }
 
@@ -54,6 +58,7 @@ impl Tracking {
         if self.scans.unchanged() < self.read {
             self.tracked.cut(self.scans.unchanged())?;
             self.tracker = tracker(&self.masking)?;
+            self.commands.restart();
             self.read = 0;
         }
         Ok(())
@@ -62,6 +67,11 @@ impl Tracking {
     /// Tracks the objects of the next scan. Returns the message about it, unless the log has them.
     fn track_next(&mut self) -> Result<Option<ObjectsHeader>, RunError> {
         let scan = self.scans.read(self.read)?;
+        let new = self.commands.of_scan(scan.stamp_ns);
+        let is_reset = |command: &Command| matches!(command, Command::Reset { .. });
+        if new.map_err(RunError::input)?.any(is_reset) {
+            self.tracker.end_tracks();
+        }
         let placed = PlacedScan {
             stamp_ns: scan.stamp_ns,
             pose: scan.pose,

@@ -59,16 +59,19 @@ impl ObjectTracker {
         Ok(&self.objects)
     }
 
+    /// Ends all tracks: the poses of the next scans are not continued from the last ones.
+    /// Identities are not given again.
+    pub fn end_tracks(&mut self) {
+        self.detector.clear();
+        self.tracks.clear();
+    }
+
     fn predict(&mut self, stamp_ns: i64) {
         if let Some(before_ns) = self.stamp_ns {
             let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
             match dt_s > 0.0 && dt_s <= MAX_GAP_S {
                 true => self.tracks.iter_mut().for_each(|track| track.predict(dt_s)),
-                // Identities are not given again.
-                false => {
-                    self.detector.clear();
-                    self.tracks.clear();
-                }
+                false => self.end_tracks(),
             }
         }
         self.stamp_ns = Some(stamp_ns);
