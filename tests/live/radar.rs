@@ -211,6 +211,12 @@ fn a_radar_that_is_not_there_yet_is_waited_for_and_a_signal_ends_the_wait() {
     let mut running = run.start();
     running.await_words(&waits);
     ask(&run, &["ps", "--check"]).refused_with(&[&waits]);
+    let once = ask(&run, &["top", "--once"]);
+    let once = &once.succeeded().stdout;
+    assert!(
+        once.starts_with("waiting for radar, up for ") && once.contains(&waits),
+        "{once}"
+    );
     running.interrupt();
     let mut running = run.start();
     running.await_words(&waits);

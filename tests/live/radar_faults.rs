@@ -184,6 +184,9 @@ fn a_radar_that_is_silent_is_waited_for_by_name_until_it_sends_again() {
     radar.played();
     let waits = format!("waiting for the radar at {}: no scan", radar.address);
     running.await_words(&format!("{waits} for 3 s"));
+    await_status(&run, "the wait for the radar", |status| {
+        status["phase"] == "waiting-for-radar"
+    });
     running.await_words("no scan for 6 s");
     let again = Radar::to(&["--listen", &radar.address], recording::small(), &[]);
     running.await_words(&format!("the radar at {} sends, after ", again.address));

@@ -1,7 +1,11 @@
 //! The folder of the results: whole files, one run at a time, nothing lost and nothing of others
 //! removed.
 
-use std::{fs, os::unix::fs::symlink, path::Path};
+use std::{
+    fs,
+    os::unix::fs::symlink,
+    path::{Path, PathBuf},
+};
 
 use crate::{
     common::{
@@ -64,7 +68,7 @@ fn results_without_a_journal_or_of_another_version_are_replaced_only_if_that_is_
 }
 
 #[test]
-fn a_live_run_that_cannot_continue_the_earlier_one_keeps_it_under_a_number() {
+fn a_live_run_that_cannot_continue_the_earlier_one_keeps_it_under_its_time() {
     let run = Run::of_recording().set("run.mode=live").rate("20");
     run.complete();
     run.clone()
@@ -78,14 +82,37 @@ fn a_live_run_that_cannot_continue_the_earlier_one_keeps_it_under_a_number() {
             age(&journal);
         }
         let odometry = run.odometry();
-        let out = run.out().canonicalize().unwrap();
-        let kept = out.with_extension((number + 1).to_string());
         let ended = run.finish();
-        let words = format!("is kept as {}", kept.display());
-        ended.succeeded().says(&words);
+        let kept = kept(ended.succeeded());
         let kept = fs::read_to_string(kept.join("odometry.csv")).unwrap();
         assert_eq!(kept, odometry);
     }
+}
+
+/// Returns the folder of the earlier run that a run has reported, whose name ends with a time.
+fn kept(ended: &Ended) -> PathBuf {
+    let (_, rest) = ended.stderr.split_once("that run is kept as ").unwrap();
+    let (kept, _) = rest.split_once(", and a new one begins").unwrap();
+    let (_, time) = kept.rsplit_once('.').unwrap();
+    assert!(time.starts_with("20") && time.contains('T'), "{kept}");
+    PathBuf::from(kept)
+}
+
+/// A robot whose power failed, and that has a new program or configuration when it is on again.
+#[test]
+fn a_killed_live_run_that_cannot_be_continued_has_its_results() {
+    let run = Run::of_recording().set("run.mode=live").rate("20");
+    let running = run.started(5);
+    running.kill_supervisor();
+    assert!(!run.out().join("summary.json").exists());
+    let ended = run.clone().set("masking.threshold=70").finish();
+    let kept = kept(ended.succeeded());
+    let rows = fs::read_to_string(kept.join("odometry.csv")).unwrap();
+    assert!(rows.lines().count() > 4, "{rows}");
+    let summary = fs::read_to_string(kept.join("summary.json")).unwrap();
+    assert!(summary.contains("interrupted"), "{summary}");
+    let config = fs::read_to_string(kept.join("config.toml")).unwrap();
+    assert!(!config.contains("threshold = 70"), "{config}");
 }
 
 /// A run that begins in the folder of a complete one and computes nothing.

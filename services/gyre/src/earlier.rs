@@ -1,6 +1,7 @@
 //! The state of an earlier run in the folder of the results: nothing, a journal to resume, or one
 //! whose results are to be written.
 
+mod closed;
 mod replaced;
 
 use std::{
@@ -14,7 +15,7 @@ use gyre_configuration::{
 };
 use gyre_contract::{
     Commands, StageId,
-    run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side},
+    run::{BEGUN_WITH, COMPLETE, Mode, Side},
 };
 use gyre_geometry::samples::SensorConfigs;
 use gyre_journal::{
@@ -32,6 +33,7 @@ use gyre_storage::{self as storage, GroupSync, LogError};
 use gyre_transport::Generation;
 use gyre_watch::recorder::Ledger;
 
+pub use closed::{close, is_closed};
 pub use replaced::{is_untouched, settle};
 
 const CONFIGURATION: &str = "config.toml";
@@ -310,38 +312,6 @@ fn known_poses(
         }
         None => Err(checkpoint::no_state(&path, content.poses).into()),
     }
-}
-
-pub fn is_closed(configuration: &Configuration) -> bool {
-    // A recording that was simulated lies in the folder, and is played from there.
-    configuration.stored().is_none()
-        && match configuration.run.earlier {
-            EarlierRun::Auto => configuration.run.mode == Mode::Live,
-            EarlierRun::Refuse => false,
-            EarlierRun::Close => true,
-        }
-}
-
-/// Closes a run that the new one cannot continue: its folder keeps all that it holds under a name
-/// with a number. Returns the folder of the new run.
-pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
-    let path = out.path();
-    let mut names = (1..).map(|number: u32| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(format!(".{number}"));
-        PathBuf::from(name)
-    });
-    let kept = names.find(|name| !name.exists()).unwrap_or_default();
-    let (old, new) = (kept.display(), path.display());
-    storage::rename(path, &kept)
-        .map_err(|error| format!("{reason}; it cannot be kept as {old} (run.earlier): {error}"))?;
-    storage::sync_folder(path.parent().unwrap_or(path))?;
-    let reason = reason.to_string();
-    let reason = reason.split(": choose another").next().unwrap_or_default();
-    print::note(format_args!(
-        "gyre: {reason}: that run is kept as {old}, and a new one begins in {new} (run.earlier)"
-    ));
-    Ok(Out::lock(path)?)
 }
 
 fn damaged(error: LogError) -> Failure {

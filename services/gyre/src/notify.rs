@@ -19,7 +19,7 @@ pub struct Notifier {
     is_ready: bool,
     every: Option<Duration>,
     kept_alive: Instant,
-    status: Instant,
+    reported: Instant,
 }
 
 impl Notifier {
@@ -33,7 +33,7 @@ impl Notifier {
             // Half of the limit, as its manual advises.
             every: sd_notify::watchdog_enabled().map(|limit| limit / 2),
             kept_alive: now,
-            status: now,
+            reported: now,
         }
     }
 
@@ -46,12 +46,12 @@ impl Notifier {
                 self.tell(&[NotifyState::Ready]);
             }
             Event::Watched => self.keep_alive(),
-            Event::Pose(pose) if self.status.elapsed() >= STATUS_EVERY => {
-                self.status = Instant::now();
-                self.tell(&[NotifyState::Status(&status(pose))]);
+            Event::Pose(pose) if self.reported.elapsed() >= STATUS_EVERY => {
+                self.reported = Instant::now();
+                self.status(&status(pose));
             }
             Event::Stopping => self.tell(&[NotifyState::Stopping]),
-            Event::Stalled(stall) => self.tell(&[NotifyState::Status(&stall.to_string())]),
+            Event::Stalled(stall) => self.status(&stall.to_string()),
             _ => {}
         }
     }
@@ -73,7 +73,16 @@ impl Notifier {
 
     /// The stages have ended, and results are written, which takes as long as it takes.
     pub fn writing(&mut self) {
-        self.tell(&[NotifyState::Status("writing the results")]);
+        self.status("writing the results");
+    }
+
+    pub fn status(&mut self, sentence: &str) {
+        self.tell(&[NotifyState::Status(sentence)]);
+    }
+
+    /// Returns whether systemd has started the run.
+    pub fn listens(&self) -> bool {
+        self.listens
     }
 
     fn tell(&mut self, states: &[NotifyState<'_>]) {

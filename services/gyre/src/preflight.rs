@@ -55,7 +55,7 @@ pub struct Recording {
 
 pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
 
-/// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
+/// Checks the dataset and the mask; `ask` may wait for the radar and the network, and comes last.
 pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflight, Failure> {
     check_link(&configuration.link)?;
     let masker = Masker::new(
@@ -70,7 +70,9 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
         // Where the results lie does not matter to a log.
         gnss_log(configuration, Path::new(""))?;
     }
-    check_addresses(&[&configuration.gnss])?;
+    if !configuration.is_radar() {
+        check_addresses(&[&configuration.gnss])?;
+    }
     if configuration.slam.is_localised() {
         localiser(&configuration.slam.map, configuration)?;
     }
@@ -227,7 +229,6 @@ impl Scans {
         if odometry.sensors.doppler.is_used() {
             return Err("doppler.kind is `auto`, but a live radar does not report which of its chirps rise: set it to `none`".into());
         }
-        check_addresses(&odometry.sensors.sampled())?;
         configuration.dataset.check()?;
         let radar = ask(configuration)?;
         Ok(Self {
@@ -250,7 +251,10 @@ fn check_link(link: &LinkConfig) -> Result<(), Failure> {
     gyre_link::check(link).map_err(|error| format!("[link]: {error}").into())
 }
 
+/// Asks the radar for the sizes of its scans. This machine must have the addresses of the other
+/// sensors.
 pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
+    check_addresses(&configuration.sensors())?;
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
         #[cfg(feature = "ros2")]

@@ -36,7 +36,8 @@ impl Progress {
         self.radar = Some((Silence::new(radar, clock::now_ns()), manifest));
     }
 
-    pub fn show(&mut self, event: &Event<'_>) {
+    /// Shows an event; returns the sentence about a radar that is silent, or sends again.
+    pub fn show(&mut self, event: &Event<'_>) -> Option<String> {
         match event {
             Event::Pose(pose) => self.pose(pose),
             Event::Note(sentence) => self.bar.say(sentence),
@@ -47,10 +48,11 @@ impl Progress {
                 self.bar
                     .show(format!("waiting for {follower}: {done} of {total} records"));
             }
-            Event::Watched => self.silence(),
+            Event::Watched => return self.silence(),
             Event::Stopping => self.radar = None,
             Event::Ready => {}
         }
+        None
     }
 
     pub fn finish(&self) {
@@ -63,17 +65,13 @@ impl Progress {
         self.bar.scans(self.done, passed, message);
     }
 
-    fn silence(&mut self) {
-        let Some((silence, manifest)) = &mut self.radar else {
-            return;
-        };
-        // The source has not begun yet.
-        let Some(received) = received::read(manifest) else {
-            return;
-        };
-        if let Some(sentence) = silence.update(&received, clock::now_ns()) {
-            self.bar.say(&sentence);
-        }
+    fn silence(&mut self) -> Option<String> {
+        let (silence, manifest) = self.radar.as_mut()?;
+        // Without a file the source has not begun yet.
+        let received = received::read(manifest)?;
+        let sentence = silence.update(&received, clock::now_ns())?;
+        self.bar.say(&sentence);
+        Some(sentence)
     }
 
     /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen
@@ -89,8 +87,10 @@ impl Progress {
     }
 }
 
-/// The silence that is reported first, ns. The next lines come when it has doubled.
+/// The silence that is reported first, ns. The next lines come when it has doubled, later each
+/// minute.
 const FIRST_NS: i64 = 3_000_000_000;
+const LATER_NS: i64 = 60_000_000_000;
 
 /// The silence of a live radar, which a run reports while there are no poses to count.
 struct Silence {
@@ -128,7 +128,7 @@ impl Silence {
         if silent_ns < self.next_ns {
             return None;
         }
-        self.next_ns *= 2;
+        self.next_ns += self.next_ns.min(LATER_NS);
         self.reported = Some(heard_ns);
         let (radar, silent_s) = (&self.radar, seconds(silent_ns));
         Some(format!("waiting for {radar}: no scan for {silent_s} s"))

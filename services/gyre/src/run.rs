@@ -283,8 +283,9 @@ fn supervise_shown(
     }
     log_session(&plan.manifest, BEGUN);
     let report = supervise(plan, signals, &mut |event| {
-        progress.show(&event);
+        let of_radar = progress.show(&event);
         notifier.report(&event);
+        of_radar.iter().for_each(|it| notifier.status(it));
     });
     let end = match &report {
         Ok(report) if report.ending == Ending::Complete => "the run is complete".to_owned(),

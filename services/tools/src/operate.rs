@@ -20,7 +20,7 @@ use gyre_client::control::Control;
 use gyre_configuration::terminal::{Failure, print};
 
 pub(crate) use background::status_of;
-pub use background::{detach_if_asked, down, up};
+pub use background::{detach_if_asked, down, is_in_background, up};
 pub use commands::{LocateArguments, ResetArguments, locate, reset};
 pub use echo::{EchoArguments, echo};
 pub use logs::{LogsArguments, logs};

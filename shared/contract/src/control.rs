@@ -87,6 +87,8 @@ gyre_geometry::named! {
         #[default]
         Starting = "starting",
         Running = "running",
+        /// No azimuth arrives from the radar, before the processes start or while they work.
+        WaitingForRadar = "waiting for radar",
         /// The stream has ended, and followers read their logs to the end.
         Following = "following",
     }

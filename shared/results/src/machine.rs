@@ -36,10 +36,22 @@ impl fmt::Display for Machine {
 
 /// Today's date (UTC) as `2024-02-29`.
 pub fn today() -> String {
-    let since = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default();
-    date(since.as_secs() / 86_400)
+    date(seconds(SystemTime::now()) / DAY_S)
+}
+
+/// Returns a time (UTC) as a part of the name of a file: `2024-02-29T21-04-05Z`.
+pub fn file_time(time: SystemTime) -> String {
+    let (day, of_day) = (seconds(time) / DAY_S, seconds(time) % DAY_S);
+    let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
+    format!("{}T{hour:02}-{minute:02}-{second:02}Z", date(day))
+}
+
+const DAY_S: u64 = 86_400;
+
+fn seconds(time: SystemTime) -> u64 {
+    time.duration_since(UNIX_EPOCH)
+        .unwrap_or_default()
+        .as_secs()
 }
 
 /// The Gregorian date of a day counted from 1970-01-01: years begin in March here, so that a leap
@@ -62,7 +74,15 @@ fn date(day: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
+
+    #[test]
+    fn a_time_in_a_name_has_its_date_and_its_time_of_day() {
+        let time = UNIX_EPOCH + Duration::from_secs(11_016 * DAY_S + 75_845);
+        assert_eq!(file_time(time), "2000-02-29T21-04-05Z");
+    }
 
     #[test]
     fn days_become_dates_leap_days_included() {

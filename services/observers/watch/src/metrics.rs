@@ -9,7 +9,10 @@ use prometheus_client::{
     registry::{Registry, Unit},
 };
 
-use gyre_contract::{Basis, Witness};
+use gyre_contract::{
+    Basis, Witness,
+    control::{Phase, Status},
+};
 
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
@@ -18,6 +21,7 @@ pub const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; cha
 #[derive(Debug)]
 struct Snapshot {
     is_up: bool,
+    status: Option<Status>,
     counts: RunCounts,
     processes: Vec<Process>,
 }
@@ -42,6 +46,7 @@ pub fn scrape(view: &RunView) -> String {
     );
     registry.register_collector(Box::new(Snapshot {
         is_up: run.state.is_up(),
+        status: view.status(),
         counts: view.counts(),
         processes: view.processes(),
     }));
@@ -107,11 +112,13 @@ impl Snapshot {
             let states = [("used", of.used[kind as usize]), (refused, of.refused[kind as usize])];
             (name, help, None, COUNTER, by("state", states))
         });
+        let waits = self.status.as_ref().is_some_and(|it| it.phase == Phase::WaitingForRadar);
         let mut metrics = vec![
             ("scans_published", "Scans that the source has published.", None, COUNTER, one(counts.published)),
             ("poses", "Poses of the trajectory.", None, COUNTER, one(counts.poses)),
             ("scans_dropped", "Scans that live mode has dropped.", None, COUNTER, one(counts.dropped)),
-            ("up", "1 while a run works, else 0.", None, GAUGE, one(self.is_up.into())),
+            ("up", "1 while a run works or waits for its radar, else 0.", None, GAUGE, one((self.is_up || waits).into())),
+            ("waiting_for_radar", "1 while no azimuth arrives from the radar, else 0.", None, GAUGE, one(waits.into())),
             ("scans_in_flight", "Scans that were published and have no pose yet.", None, GAUGE, one(counts.in_flight)),
             ("motions", "Motions by what they rest on.", None, COUNTER, Values::By("basis", by_basis.collect())),
         ];
@@ -207,6 +214,7 @@ mod tests {
         let mut registry = Registry::with_prefix("gyre");
         registry.register_collector(Box::new(Snapshot {
             is_up: true,
+            status: None,
             counts,
             processes: vec![source],
         }));

@@ -227,10 +227,9 @@ fn report(followed: &Followed) {
     while !view.is_stopping() {
         if reported.elapsed() >= REPORT_INTERVAL {
             reported = Instant::now();
-            if view.run().state.is_up()
-                && let Some((status, processes)) = meter.read(&followed.out)
-            {
-                view.set_processes(&status, processes);
+            match meter.read(&followed.out) {
+                Some((status, processes)) => view.set_processes(&status, processes),
+                None => view.set_unknown(),
             }
             view.report();
         }

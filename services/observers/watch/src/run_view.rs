@@ -9,7 +9,9 @@ use axum::extract::ws::Message;
 use gyre_client::{Manifest, clock};
 use gyre_contract::{
     Message as _, Objects, ObjectsHeader, Pose, PoseHeader, SampleRates, Scan, ScanHeader,
-    WitnessCounts, control::Status, flag,
+    WitnessCounts,
+    control::{Phase, Status},
+    flag,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -67,7 +69,9 @@ struct ViewState {
     /// Points that wait for the pose of their scan.
     pending: Option<(u64, PackedPoints)>,
     reported: Option<(i64, u64)>,
+    /// Why something is not shown.
     notice: Option<String>,
+    status: Option<Status>,
     processes: Vec<Process>,
 }
 
@@ -200,6 +204,17 @@ impl RunView {
         state.counts.published = state.counts.published.max(published);
         state.counts.in_flight = published - with_pose;
         state.processes = processes;
+        state.status = Some(status.clone());
+    }
+
+    /// Notes that no supervisor answers.
+    pub fn set_unknown(&self) {
+        self.state().status = None;
+    }
+
+    /// Returns what the supervisor has reported of the run last; `None` while no run answers.
+    pub fn status(&self) -> Option<Status> {
+        self.state().status.clone()
     }
 
     pub fn processes(&self) -> Vec<Process> {
@@ -241,7 +256,7 @@ impl RunView {
             distance_m: state.track.length_m(),
             delays: delays::report(state.poses.iter().map(|pose| &pose.item), now_ns),
             others: others(&state),
-            notice: state.notice.clone(),
+            notice: state.notice.clone().or_else(|| trouble(&state)),
             processes: state.processes.clone(),
         };
         send_json(&self.updates.health, &health);
@@ -297,6 +312,13 @@ impl RunView {
     pub fn is_stopping(&self) -> bool {
         *self.updates.stop.borrow()
     }
+}
+
+fn trouble(state: &ViewState) -> Option<String> {
+    let status = state.status.as_ref()?;
+    let waits = status.phase == Phase::WaitingForRadar;
+    let phase = waits.then(|| status.phase.name().to_owned());
+    status.notice.clone().or(phase)
 }
 
 fn others(state: &ViewState) -> Option<String> {

@@ -19,9 +19,11 @@ const POLL: Duration = Duration::from_millis(10);
 #[derive(Debug, Error)]
 #[error("{sentence}")]
 pub struct AskError {
-    sentence: String,
+    pub sentence: String,
     /// True if the radar may answer later: it or its network is not there yet.
     pub may_pass: bool,
+    /// True if no radar has this name, or its network does not know the name yet.
+    pub is_unknown_name: bool,
 }
 
 impl AskError {
@@ -34,7 +36,11 @@ impl AskError {
     }
 
     fn of(sentence: String, may_pass: bool) -> Self {
-        Self { sentence, may_pass }
+        Self {
+            sentence,
+            may_pass,
+            is_unknown_name: false,
+        }
     }
 
     fn no_answer(address: &str, error: &io::Error) -> Self {
@@ -43,8 +49,11 @@ impl AskError {
         let sentence = format!(
             "no radar answers at {address} ({text}): check source.address, and that the radar is on and in reach"
         );
-        let may_pass = !is_unknown_name && error.kind() != ErrorKind::InvalidInput;
-        Self::of(sentence, may_pass)
+        Self {
+            sentence,
+            may_pass: !is_unknown_name && error.kind() != ErrorKind::InvalidInput,
+            is_unknown_name,
+        }
     }
 }
 

@@ -15,6 +15,8 @@ use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, socket_with, soc
 use crate::live_radar::Settings;
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
+/// Time between two lines of the log about a radar that stays away.
+const LOG_EVERY: Duration = Duration::from_secs(60);
 /// Pauses between attempts to connect: the first pause, which doubles up to the second.
 const RETRY_PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
 const REQUESTS: [Request; 3] = [
@@ -51,6 +53,7 @@ pub struct Connection {
     pub receives_azimuths: bool,
     retry_at: Instant,
     pause: Duration,
+    logged: Option<Instant>,
     from: Option<SocketAddr>,
     /// The only sender whose datagrams are taken.
     sender: Option<SocketAddr>,
@@ -73,6 +76,7 @@ impl Connection {
             receives_azimuths: false,
             retry_at: now,
             pause: RETRY_PAUSES[0],
+            logged: None,
             from: None,
             sender: None,
             radar: None,
@@ -185,10 +189,14 @@ impl Connection {
     /// Closes the connection, to be opened again after a pause.
     pub fn close(&mut self, reason: impl Display) -> ReadResult {
         let pause = self.pause;
-        tracing::warn!(
-            address = %self.address,
-            "no connection to the radar, trying again in {pause:?}: {reason}"
-        );
+        let is_longest = pause == RETRY_PAUSES[1];
+        if !is_longest || self.logged.is_none_or(|it| it.elapsed() >= LOG_EVERY) {
+            self.logged = Some(Instant::now());
+            tracing::warn!(
+                address = %self.address,
+                "no connection to the radar, trying again in {pause:?}: {reason}"
+            );
+        }
         self.socket = None;
         self.sender = None;
         self.receives_azimuths = false;

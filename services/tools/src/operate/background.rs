@@ -26,10 +26,15 @@ const LOG: &str = "log/gyre.txt";
 const PERIOD: Duration = Duration::from_millis(50);
 const EXPLAIN_AFTER: Duration = Duration::from_secs(3);
 
-/// Leaves the session of the terminal if `gyre up` started this run: the run continues when the
-/// terminal closes.
+/// Returns whether `gyre up` started this run.
+#[must_use]
+pub fn is_in_background() -> bool {
+    env::var_os(DETACHED).is_some()
+}
+
+/// Leaves the session of the terminal of `gyre up`: the run continues when the terminal closes.
 pub fn detach_if_asked() {
-    if env::var_os(DETACHED).is_some() {
+    if is_in_background() {
         // Fails for the leader of a session, which has left it already.
         let _ = rustix::process::setsid();
     }

@@ -85,7 +85,7 @@ fn ills(status: &Status) -> Vec<String> {
     let ill = ill.filter(|it| !(ends && it.activity == Activity::Ended));
     let ill = ill.map(|it| format!("{out}: {} is {}", it.name, it.activity.name()));
     let received = status.processes.iter().filter_map(|it| it.received);
-    let deaf = received.filter(|it| !it.is_receiving && status.phase == Phase::Running);
+    let deaf = received.filter(|it| !it.is_receiving && status.phase == Phase::WaitingForRadar);
     let deaf = deaf.map(|it| {
         let again = it.reconnections();
         format!("{out}: no azimuths arrive from the radar, {again} reconnections so far")
@@ -98,7 +98,11 @@ fn ills(status: &Status) -> Vec<String> {
 
 pub fn summary(status: &Status) -> String {
     let mode = if status.live { "live" } else { "lossless" };
-    let (phase, uptime) = (status.phase.name(), duration(status.uptime_s));
+    let uptime = duration(status.uptime_s);
+    let phase = match status.phase {
+        Phase::WaitingForRadar => format!("waiting for radar, up for {uptime}"),
+        phase => format!("{} for {uptime}", phase.name()),
+    };
     let (pid, poses, dropped) = (status.pid, status.poses, status.dropped);
     let age = status.last_pose_s.map(duration);
     let age = age
@@ -106,9 +110,7 @@ pub fn summary(status: &Status) -> String {
         .unwrap_or_default();
     let notice = status.notice.as_ref().map(|it| format!("; {it}"));
     let notice = notice.unwrap_or_default();
-    format!(
-        "{phase} for {uptime}, {mode}, supervised by {pid}: {poses} poses{age}, {dropped} dropped{notice}"
-    )
+    format!("{phase}, {mode}, supervised by {pid}: {poses} poses{age}, {dropped} dropped{notice}")
 }
 
 fn remarks(process: &ProcessStatus) -> String {

@@ -22,7 +22,7 @@ use ratatui::{
     crossterm::event::{self, Event, KeyCode, KeyModifiers},
 };
 
-use crate::operate::{RunChoice, chosen};
+use crate::operate::{RunChoice, chosen, processes::summary};
 
 #[derive(Debug, Args)]
 pub struct TopArguments {
@@ -39,6 +39,8 @@ pub struct TopArguments {
 
 /// Time between two snapshots at the queue of poses, which has room for nine.
 const PERIOD: Duration = Duration::from_millis(50);
+/// Time between two looks at a run that waits for its radar.
+const WAIT: Duration = Duration::from_secs(1);
 
 pub fn top(arguments: &TopArguments) -> Result<(), Failure> {
     let every = Duration::try_from_secs_f64(arguments.every)
@@ -46,7 +48,9 @@ pub fn top(arguments: &TopArguments) -> Result<(), Failure> {
         .filter(|every| *every >= PERIOD)
         .ok_or("--every must be 0.05 s or more")?;
     let control = chosen(&arguments.run)?;
-    let run = Run::open(control.out())?;
+    let Some(run) = opened(&control, arguments.once)? else {
+        return Ok(());
+    };
     let poses = run.observe()?;
     // Without a place for it the rates are missing, and nothing else.
     let has_samples = run.manifest().limits.samples > 0;
@@ -69,6 +73,29 @@ pub fn top(arguments: &TopArguments) -> Result<(), Failure> {
         print::line("the run has ended")?;
     }
     Ok(())
+}
+
+/// Waits until a run that waits for its radar has processes; `None` if the person ends that, or
+/// asked for one look.
+fn opened(control: &Control, once: bool) -> Result<Option<Run>, Failure> {
+    let (signals, mut shown) = (Signals::install()?, None);
+    loop {
+        let waiting = match Run::open(control.out()) {
+            Ok(run) => return Ok(Some(run)),
+            Err(error) => control
+                .status()
+                .ok()
+                .filter(|it| it.notice.is_some())
+                .ok_or(error)?,
+        };
+        if shown != waiting.notice {
+            print::line(summary(&waiting))?;
+            shown = waiting.notice;
+        }
+        if once || signals.sleep(WAIT)? {
+            return Ok(None);
+        }
+    }
 }
 
 /// Returns the columns of the terminal; an arbitrary number if the output is not a terminal.

@@ -13,8 +13,9 @@ pub struct RunConfig {
     /// `lossless`: every scan is processed, and the source waits. `live`: the newest scan wins.
     pub mode: Mode,
     /// The treatment of a run in the folder of the results that this one cannot continue, as one of
-    /// another program or configuration. `close`: its folder gets a number in its name, and this
-    /// run begins. `refuse`: this run does not begin. `auto`: `close` in live mode, else `refuse`.
+    /// another program or configuration. `close`: it has its results, the time of its begin follows
+    /// the name of its folder, and this run begins. `refuse`: this run does not begin. `auto`:
+    /// `close` in live mode, else `refuse`.
     pub earlier: EarlierRun,
     /// Maximum number of scans between admission and their pose, 1 to 64. More than the free cores
     /// increases latency and not throughput.

@@ -1,7 +1,10 @@
 //! Datagrams of live sensors: lines of text.
 
 use std::{
-    io::ErrorKind::{Interrupted, WouldBlock},
+    io::{
+        self,
+        ErrorKind::{AddrNotAvailable, Interrupted, WouldBlock},
+    },
     mem,
     net::UdpSocket,
     os::fd::{AsFd, AsRawFd, BorrowedFd},
@@ -9,6 +12,7 @@ use std::{
 
 use gyre_geometry::samples::SensorConfig;
 use gyre_transport::RunError;
+use thiserror::Error;
 
 const MAX_DATAGRAM: usize = 65_536;
 /// Bytes of a turn: the samples of a scan, or as many datagrams of a line each, which count as
@@ -17,9 +21,32 @@ const TURN_BYTES: usize = 1 << 16;
 const LEAST_BYTES: usize = 128;
 
 /// Checks that the addresses of these sensors are free, before a run receives there.
-pub fn check_addresses(sensors: &[&dyn SensorConfig]) -> Result<(), RunError> {
+pub fn check_addresses(sensors: &[&dyn SensorConfig]) -> Result<(), BadAddress> {
     let mut received = sensors.iter().filter(|it| it.receives());
     received.try_for_each(|sensor| Receiver::open(*sensor).map(drop))
+}
+
+#[derive(Debug, Error)]
+#[error("cannot receive the {what} at {address} ({section}.listen): {error}")]
+pub struct BadAddress {
+    what: &'static str,
+    section: &'static str,
+    address: String,
+    error: io::Error,
+}
+
+impl BadAddress {
+    /// Returns whether this machine may have the address later: its network is not there yet.
+    #[must_use]
+    pub fn may_come(&self) -> bool {
+        self.error.kind() == AddrNotAvailable
+    }
+}
+
+impl From<BadAddress> for RunError {
+    fn from(error: BadAddress) -> Self {
+        Self::input(error)
+    }
 }
 
 pub(crate) struct Receiver {
@@ -31,18 +58,18 @@ pub(crate) struct Receiver {
 
 impl Receiver {
     /// Opens the address of a live sensor.
-    pub fn open(sensor: &dyn SensorConfig) -> Result<Self, RunError> {
+    pub fn open(sensor: &dyn SensorConfig) -> Result<Self, BadAddress> {
         let (section, address) = (sensor.of().section(), sensor.listen());
         let bound = UdpSocket::bind(address);
         let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
-        let socket = opened.map_err(|error| {
-            let what = match section {
+        let socket = opened.map_err(|error| BadAddress {
+            what: match section {
                 "gnss" => "fixes of GNSS",
                 section => section,
-            };
-            RunError::Input(format!(
-                "cannot receive the {what} at {address} ({section}.listen): {error}"
-            ))
+            },
+            section,
+            address: address.to_owned(),
+            error,
         })?;
         Ok(Self {
             socket,

@@ -255,9 +255,11 @@ impl Supervisor<'_> {
         let begun = &self.run.plan.stages;
         let mut processes: Vec<_> = self.processes.iter().zip(begun).map(status).collect();
         let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
+        let is_deaf = |process: &ProcessStatus| process.received.is_some_and(|it| !it.is_receiving);
         let phase = match () {
             () if self.followers.are_awaited => Phase::Following,
             () if processes.iter().any(is_starting) => Phase::Starting,
+            () if processes.iter().any(is_deaf) => Phase::WaitingForRadar,
             () => Phase::Running,
         };
         // Nothing waits for it.
