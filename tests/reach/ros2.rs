@@ -5,8 +5,10 @@
 use std::{
     collections::BTreeMap,
     env,
-    io::{BufRead, BufReader, Lines, Write},
-    process::{self, Child, ChildStdout, Command, Stdio},
+    io::{BufRead, BufReader, Write},
+    process::{self, Child, Command, Stdio},
+    sync::mpsc::{Receiver, channel},
+    thread,
 };
 
 use rustix::process::{Pid, Signal, kill_process};
@@ -47,7 +49,8 @@ pub(crate) fn domain(test: u32) -> String {
 /// A program that prints lines. Dropped, it is killed.
 pub(crate) struct Program {
     child: Child,
-    said: Lines<BufReader<ChildStdout>>,
+    /// Its lines, which are read as they come: a program whose output is full would wait.
+    said: Receiver<String>,
 }
 
 impl Program {
@@ -55,9 +58,14 @@ impl Program {
     fn start(command: &mut Command) -> Self {
         let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().unwrap();
-        let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
-        let first = said.next().expect("it has ended");
-        first.unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let (to, said) = channel();
+        thread::spawn(move || {
+            lines
+                .map_while(Result::ok)
+                .try_for_each(|line| to.send(line))
+        });
+        said.recv().expect("it has ended");
         Self { child, said }
     }
 
@@ -83,8 +91,7 @@ impl Program {
 
     /// Waits for a line with these words.
     pub(crate) fn await_words(&mut self, words: &str) -> String {
-        let mut said = self.said.by_ref().map(Result::unwrap);
-        let found = said.find(|line| line.contains(words));
+        let found = self.said.iter().find(|line| line.contains(words));
         found.unwrap_or_else(|| panic!("it has ended without `{words}`"))
     }
 
@@ -101,7 +108,7 @@ impl Program {
     /// Closes the input of the program, and returns its output up to its end.
     fn rest(mut self) -> Vec<String> {
         drop(self.child.stdin.take());
-        let said = self.said.by_ref().map(Result::unwrap).collect();
+        let said = self.said.iter().collect();
         assert!(self.child.wait().unwrap().success());
         said
     }
@@ -355,6 +362,19 @@ fn a_managed_node_publishes_once_it_is_active() {
 }
 
 #[test]
+fn the_launch_file_starts_the_bridge() {
+    let example = format!("{PROJECT}/examples/ros2.launch.py");
+    let words = script("reach/ros2/launch.py")
+        .arg(example)
+        .output()
+        .unwrap();
+    let words = String::from_utf8(words.stdout).unwrap();
+    let words: Vec<&str> = words.lines().collect();
+    assert_eq!(words[..4], ["gyre", "ros2", "out/radar", "--wait"]);
+    Program::bridge(&Run::small(), &domain(18), &words[4..]).interrupt();
+}
+
+#[test]
 fn a_node_of_ros_receives_the_velocities_by_doppler_and_what_motions_rest_on() {
     only_if!(has_ros());
     let run = without_doppler().set("doppler.kind=auto").rate("2");
@@ -412,7 +432,7 @@ fn a_node_of_ros_receives_all_poses_of_ten_minutes() {
     let (run, domain) = (Run::configured(&simulation).rate("1"), domain(16));
     let mut bridge = Program::bridge(&run, &domain, &[]);
     let node = Program::node(&domain, &["/"]);
-    run.complete();
+    assert!(run.command().output().unwrap().status.success());
     assert_whole(&mut bridge);
     let topics = received(node);
     assert_odometry(&topics["/odom"], &run);

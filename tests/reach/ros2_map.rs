@@ -83,7 +83,7 @@ fn a_node_of_ros_receives_the_places_in_the_map_of_an_earlier_drive() {
     bridge.await_end();
     let topics = received(node);
 
-    let fixes = &topics["/fix"];
+    let fixes = &topics["/map_fix"];
     assert!(fixes.len() > 40, "{}", fixes.len());
     let place = |message: &Value| {
         let at = &message["pose"]["pose"]["position"];

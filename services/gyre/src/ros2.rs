@@ -7,6 +7,7 @@ use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
 };
+use gyre_geometry::samples::SensorKind;
 use gyre_results::{absolute, map_options};
 use gyre_ros2_bridge::{Bridge, MapSettings, RunSettings, Settings};
 use gyre_ros2_messages::Domain;
@@ -41,6 +42,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<(), Failure> {
         is_managed: arguments.managed,
         of_run: run_settings,
     })?;
+    let signals = Signals::install()?;
     let out = run.display();
     print::note(format_args!(
         "gyre: {out} is published in domain {} of ROS 2",
@@ -51,11 +53,18 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<(), Failure> {
             "gyre: whoever is on this network can read it, and DDS carries it unencrypted; --interface 127.0.0.1 keeps it on this computer",
         );
     }
-    let signals = Signals::install()?;
     bridge.publish(&signals, |sentence| {
         print::note(format_args!("gyre: {sentence}"));
     })?;
     Ok(())
+}
+
+/// Returns the topics of ROS 2 from which a run receives gyro, wheels and others.
+fn sensors_in_ros2(configuration: &Configuration) -> Vec<String> {
+    let sensors = configuration.odometry.sensors.sampled();
+    let in_ros2 = sensors.iter().filter(|it| it.kind() == SensorKind::Ros2);
+    let topics = in_ros2.filter_map(|it| it.live_topic());
+    topics.map(str::to_owned).collect()
 }
 
 fn run_settings(out: &Path) -> Result<RunSettings, String> {
@@ -69,5 +78,6 @@ fn run_settings(out: &Path) -> Result<RunSettings, String> {
         }),
         has_doppler: configuration.odometry.sensors.doppler.is_used(),
         is_replay: !configuration.is_radar(),
+        sensor_topics: sensors_in_ros2(&configuration),
     })
 }

@@ -25,7 +25,8 @@ const FRAMES: [(&str, Frame); 4] = [
 impl RosArguments {
     pub fn parse(words: &[String]) -> Result<Self, String> {
         let mut found = Self::default();
-        let mut words = words.iter();
+        // Launch files may write it twice.
+        let mut words = words.iter().filter(|word| *word != "--ros-args");
         while let Some(option) = words.next() {
             let value = words.next().and_then(|value| value.split_once(":="));
             let is_known = match (option.as_str(), value) {
@@ -85,7 +86,7 @@ mod tests {
     #[test]
     fn launch_files_name_the_node_and_the_frames() {
         let found = parse(
-            "-r __node:=radar -r __ns:=/car -p base_frame:=car/base -p publish_odom_tf:=False",
+            "-r __node:=radar -r __ns:=/car --ros-args -p base_frame:=car/base -p publish_odom_tf:=False",
         );
         let found = found.unwrap();
         let names = (found.node.as_deref(), found.namespace.as_deref());

@@ -32,7 +32,15 @@ pub fn follow_runs(shared: &Shared, mut topics: RunTopics, say: fn(&str)) {
         };
         let manifest = run.manifest();
         shared.begin(manifest.window.slam);
-        follow_run(shared, manifest, &mut topics, say);
+        let settings = (shared.settings.of_run)(&shared.settings.out);
+        match own_topic(&settings, &topics.poses) {
+            Some(sentence) => {
+                say(&sentence);
+                shared.state().notice = Some(sentence);
+                await_end(shared, &run);
+            }
+            None => follow_run(shared, manifest, &settings, &mut topics, say),
+        }
         if run.has_ended() {
             shared.state().phase = RunPhase::Ended;
             let sentence = sentence(&shared.state());
@@ -41,10 +49,24 @@ pub fn follow_runs(shared: &Shared, mut topics: RunTopics, say: fn(&str)) {
     }
 }
 
+/// Returns a sentence if the run would receive its own odometry as the speed of its wheels.
+fn own_topic(settings: &Result<RunSettings, String>, topics: &PoseTopics) -> Option<String> {
+    let mut received = settings.iter().flat_map(|it| &it.sensor_topics);
+    let topic = received.find(|topic| topics.odometry.is(topic))?;
+    Some(format!(
+        "the run is not published: it receives its wheels from {topic}, the topic of its own odometry; start the bridge with --namespace"
+    ))
+}
+
 /// Follows the topics of a run in a thread each, until the run has ended or the bridge stops.
-fn follow_run(shared: &Shared, manifest: &Manifest, topics: &mut RunTopics, say: fn(&str)) {
+fn follow_run(
+    shared: &Shared,
+    manifest: &Manifest,
+    settings: &Result<RunSettings, String>,
+    topics: &mut RunTopics,
+    say: fn(&str),
+) {
     let (name, window) = (manifest.prefix.as_str(), &manifest.window);
-    let settings = (shared.settings.of_run)(&shared.settings.out);
     let is = |of: fn(&RunSettings) -> bool| settings.as_ref().is_ok_and(of);
     let RunTopics {
         poses,
@@ -99,7 +121,7 @@ fn follow_run(shared: &Shared, manifest: &Manifest, topics: &mut RunTopics, say:
             if let Some(maps) = map {
                 threads.spawn(move || {
                     follow_topic(&mut |run| {
-                        live_map::follow(shared, run, &settings, maps);
+                        live_map::follow(shared, run, settings, maps);
                         Ok(())
                     });
                 });

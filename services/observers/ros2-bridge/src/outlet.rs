@@ -21,6 +21,11 @@ impl<M: Serialize> Outlet<M> {
         }
     }
 
+    /// Returns whether it is the topic of this absolute name.
+    pub fn is(&self, topic: &str) -> bool {
+        self.dds_name == format!("rt/{}", topic.trim_start_matches('/'))
+    }
+
     /// Returns whether a reader of the topic has been found.
     pub fn has_reader(&self) -> bool {
         let readers = self.participant.discovered_readers();

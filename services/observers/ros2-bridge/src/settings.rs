@@ -35,6 +35,8 @@ pub struct RunSettings {
     pub has_doppler: bool,
     /// True if the run plays a recording or a simulation, not a radar.
     pub is_replay: bool,
+    /// The topics of ROS 2 from which it receives other sensors.
+    pub sensor_topics: Vec<String>,
 }
 
 #[derive(Clone, Debug, PartialEq)]

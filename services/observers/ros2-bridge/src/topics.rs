@@ -67,7 +67,8 @@ impl Topics {
                     markers: node.publish("object_markers", KEPT)?,
                 },
                 doppler: node.publish("doppler", KEPT)?,
-                fixes: node.publish("fix", KEPT)?,
+                // Receivers of GNSS publish `/fix`.
+                fixes: node.publish("map_fix", KEPT)?,
                 map: node.publish_if(settings.map, "map", Keep::Latched)?,
             },
             mounting: node.publish("/tf_static", Keep::Latched)?,
