@@ -49,7 +49,7 @@ pub(crate) fn domain(test: u32) -> String {
 /// A program that prints lines. Dropped, it is killed.
 pub(crate) struct Program {
     child: Child,
-    /// Its lines, which are read as they come: a program whose output is full would wait.
+    /// The lines so far, read as they come: a program whose output is full would wait.
     said: Receiver<String>,
 }
 
