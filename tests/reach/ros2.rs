@@ -1,19 +1,24 @@
-//! ROS 2 without ROS 2: an independent peer (Cyclone DDS) receives the messages of a run. All on
-//! the loopback, each test in a domain of its own, as the tests of
-//! [`ros2_driver`](super::ros2_driver).
+//! A node of ROS 2 (rclpy on Fast DDS) receives the messages of a run, and Cyclone DDS those for
+//! which that ROS 2 has no packages. All on the loopback, each test in a domain of its own, as the
+//! tests of [`ros2_driver`](super::ros2_driver).
 
 use std::{
     collections::BTreeMap,
-    io::{BufRead, BufReader, Lines},
-    process::{self, Child, ChildStdout, Command, Stdio},
+    env,
+    io::{BufRead, BufReader, Write},
+    process::{self, Child, Command, Stdio},
+    sync::mpsc::{Receiver, channel},
+    thread,
 };
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::{
-    common::{Run, gyre, odometry, script},
+    PROJECT,
+    common::{Run, can, gyre, odometry, recording, script},
     reach::{only_if, python_has},
+    restart::faults::configurations::without_doppler,
 };
 
 /// The variance of an unmeasured quantity.
@@ -24,16 +29,28 @@ pub(crate) fn can_speak() -> bool {
     python_has("cyclonedds")
 }
 
-/// A domain that only this test of this process uses. Those above 101 share their ports with other
-/// programs.
+/// The Python with the packages of `reach/ros2/requirements.txt`: it starts itself again with other
+/// libraries, so that it has an environment of its own.
+fn python_of_ros() -> String {
+    env::var("GYRE_ROS_PYTHON").unwrap_or_else(|_| "python3".to_owned())
+}
+
+/// Returns whether a node of ROS 2 can be started; prints why a test is skipped.
+pub(crate) fn has_ros() -> bool {
+    can(&[&python_of_ros(), "-c", "import rclpy"])
+}
+
+/// A domain that only this test of this process uses, of 20. Those above 101 share their ports with
+/// other programs.
 pub(crate) fn domain(test: u32) -> String {
-    (1 + (process::id() % 9) * 11 + test).to_string()
+    (1 + (process::id() % 5) * 20 + test).to_string()
 }
 
 /// A program that prints lines. Dropped, it is killed.
 pub(crate) struct Program {
     child: Child,
-    said: Lines<BufReader<ChildStdout>>,
+    /// The lines so far, read as they come: a program whose output is full would wait.
+    said: Receiver<String>,
 }
 
 impl Program {
@@ -41,9 +58,14 @@ impl Program {
     fn start(command: &mut Command) -> Self {
         let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().unwrap();
-        let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
-        let first = said.next().expect("it has ended");
-        first.unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let (to, said) = channel();
+        thread::spawn(move || {
+            lines
+                .map_while(Result::ok)
+                .try_for_each(|line| to.send(line))
+        });
+        said.recv().expect("it has ended");
         Self { child, said }
     }
 
@@ -52,29 +74,57 @@ impl Program {
         Self::start(script(&format!("reach/ros2/{name}")).args(arguments))
     }
 
+    /// A node of ROS 2 that reads the topics of the run in a namespace.
+    pub(crate) fn node(domain: &str, arguments: &[&str]) -> Self {
+        let mut command = Command::new(python_of_ros());
+        command.arg(format!("{PROJECT}/tests/reach/ros2/node.py"));
+        Self::start(on_loopback(command.args(arguments), domain))
+    }
+
     /// A bridge that waits for the run. Its sentences for the terminal count as its lines.
     pub(crate) fn bridge(run: &Run, domain: &str, options: &[&str]) -> Self {
         let mut command = Command::new("sh");
         command.args(["-c", "exec \"$@\" 2>&1", "sh"]);
         command.arg(gyre().get_program()).arg("ros2").arg(run.out());
-        command.args(["--wait", "--domain", domain, "--interface", "127.0.0.1"]);
-        Self::start(command.args(options))
+        Self::start(on_loopback(command.arg("--wait").args(options), domain))
+    }
+
+    /// Waits for a line with these words.
+    pub(crate) fn await_words(&mut self, words: &str) -> String {
+        let found = self.said.iter().find(|line| line.contains(words));
+        found.unwrap_or_else(|| panic!("it has ended without `{words}`"))
+    }
+
+    /// Waits until a bridge has published the whole run.
+    pub(crate) fn await_end(&mut self) -> String {
+        self.await_words("the run has ended")
+    }
+
+    fn write(&mut self, line: &str) {
+        let input = self.child.stdin.as_mut().unwrap();
+        writeln!(input, "{line}").unwrap();
     }
 
     /// Closes the input of the program, and returns its output up to its end.
     fn rest(mut self) -> Vec<String> {
         drop(self.child.stdin.take());
-        let said = self.said.by_ref().map(Result::unwrap).collect();
+        let said = self.said.iter().collect();
         assert!(self.child.wait().unwrap().success());
         said
     }
 
-    /// Ends the program as Ctrl-C does, and returns its output.
-    pub(crate) fn interrupt(self) -> Vec<String> {
+    /// Ends the program as Ctrl-C does.
+    fn interrupt(self) {
         let pid = Pid::from_child(&self.child);
         kill_process(pid, Signal::INT).unwrap();
-        self.rest()
+        self.rest();
     }
+}
+
+/// Keeps a program of ROS 2 in a domain of this computer, by the variables of ROS 2.
+fn on_loopback<'a>(command: &'a mut Command, domain: &str) -> &'a mut Command {
+    command.env("ROS_DOMAIN_ID", domain);
+    command.env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 }
 
 impl Drop for Program {
@@ -153,21 +203,32 @@ pub(crate) fn transforms(messages: &[Value]) -> Vec<(i64, String, [f64; 4])> {
     .collect()
 }
 
+/// Waits until a bridge has published the whole run without a loss.
+fn assert_whole(bridge: &mut Program) {
+    let said = bridge.await_end();
+    let nothing = "0 poses missed; 0 messages not sent because readers were behind";
+    assert!(said.ends_with(nothing), "{said}");
+}
+
+/// Reliably, and as sensor data.
 #[test]
 fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
-    only_if!(can_speak());
+    only_if!(can_speak() && has_ros());
     // The queue holds four seconds, should the bridge be late.
     let run = Run::of_recording().rate("1");
     let domain = domain(0);
-    let bridge = Program::bridge(&run, &domain, &["--mounting", "0,0,0"]);
+    let mut bridge = Program::bridge(&run, &domain, &["--mounting", "0,0,0"]);
     let peer = Program::peer("observer.py", &[&domain, "/"]);
+    let node = Program::node(&domain, &["/"]);
     let undisturbed = run.complete();
-    let topics = received(peer);
-    let said = bridge.interrupt();
-    let is_whole = |line: &String| line.contains("0 poses missed; 0 messages not sent");
-    assert!(said.iter().any(is_whole), "{said:?}");
+    assert_whole(&mut bridge);
+    let mut topics = received(node);
+    topics.extend(received(peer));
+    bridge.interrupt();
 
     assert_odometry(&topics["/odom"], &run);
+    assert_eq!(stamps(&topics["sensor"]), stamps(&topics["/odom"]));
+    assert!(topics["sensor"] == topics["/odom"]);
     assert_eq!(Run::of_recording().complete(), undisturbed);
     let of_poses = transforms(&topics["/tf"]);
     assert_eq!(of_poses.len(), topics["/odom"].len());
@@ -188,23 +249,27 @@ fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
     let parts: Vec<_> = parts.flat_map(|it| it.as_array().unwrap()).collect();
     let is = |part: &Value, name: &str| part["name"] == name && part["level"] == 0;
     let is_well = |name| parts.iter().any(|part| is(part, name));
-    assert!(is_well("gyre") && is_well("gyre: masking"), "{parts:?}");
+    for name in ["gyre", "gyre: motion", "gyre: masking"] {
+        assert!(is_well(name), "{name}: {parts:?}");
+    }
 }
 
 /// As `robot_localization` needs it, which publishes the transform of odometry itself and predicts
 /// where nothing was measured.
 #[test]
 fn a_filter_can_have_its_own_transforms_and_sees_which_velocities_are_predicted() {
-    only_if!(can_speak());
+    only_if!(can_speak() && has_ros());
     let settings = ["refinement.min_overlap=1", "refinement.firm_overlap=1"];
     let run = settings.into_iter().fold(Run::of_recording(), Run::set);
     let run = run.rate("1");
     let domain = domain(7);
-    let bridge = Program::bridge(&run, &domain, &["--no-tf"]);
+    let mut bridge = Program::bridge(&run, &domain, &["--no-tf"]);
     let peer = Program::peer("observer.py", &[&domain, "/", "/tf"]);
+    let node = Program::node(&domain, &["/"]);
     run.finish().failed_with(&["predicted motions"]);
-    let topics = received(peer);
-    bridge.interrupt();
+    bridge.await_end();
+    let mut topics = received(node);
+    topics.extend(received(peer));
 
     let outcomes = odometry::columns(&run.odometry(), &["outcome"]).concat();
     let predicted = outcomes.iter().filter(|word| *word == "predicted").count();
@@ -212,4 +277,165 @@ fn a_filter_can_have_its_own_transforms_and_sees_which_velocities_are_predicted(
     assert_odometry(&topics["/odom"], &run);
     assert!(!topics.contains_key("/tf"), "{:?}", topics["/tf"]);
     assert_eq!(transforms(&topics["/tf_static"])[0].1, "base_link -> radar");
+}
+
+fn stamps(messages: &[Value]) -> Vec<i64> {
+    messages.iter().map(|it| stamp_ns(&it["header"])).collect()
+}
+
+#[test]
+fn a_replay_gives_the_time_to_nodes_with_simulated_time() {
+    only_if!(has_ros());
+    let (run, domain) = (Run::of_recording().rate("2"), domain(12));
+    let mut bridge = Program::bridge(&run, &domain, &["--clock"]);
+    let node = Program::node(&domain, &["/", "sim"]);
+    run.complete();
+    bridge.await_end();
+    let topics = received(node);
+
+    assert_odometry(&topics["/odom"], &run);
+    let stamps = stamps(&topics["/odom"]);
+    let of_clock = |it: &Value| {
+        let part = |name: &str| it["clock"][name].as_i64().unwrap();
+        part("sec") * 1_000_000_000 + part("nanosec")
+    };
+    let clock: Vec<i64> = topics["/clock"].iter().map(of_clock).collect();
+    assert!(clock.iter().all(|time| stamps.contains(time)));
+    let now: Vec<i64> = topics["now"].iter().filter_map(Value::as_i64).collect();
+    assert!(now.is_sorted() && clock.is_sorted());
+    assert_eq!((clock.last(), now.last()), (stamps.last(), stamps.last()));
+}
+
+#[test]
+fn both_sides_can_start_again_and_a_late_node_receives_the_map() {
+    only_if!(has_ros());
+    let data = recording::around_a_block();
+    let run = Run::small().data(data).set("slam.kind=graph").rate("6");
+    let domain = domain(13);
+    let bridge = Program::bridge(&run, &domain, &[]);
+    let node = Program::node(&domain, &["/"]);
+    let mut running = run.start();
+    running.await_poses(30);
+    drop(bridge);
+    running.await_poses(45);
+    let mut bridge = Program::bridge(&run, &domain, &[]);
+    running.finish().succeeded();
+    bridge.await_end();
+    let topics = received(node);
+    let late = received(Program::node(&domain, &["/"]));
+
+    let all = odometry::columns(&run.result("poses.csv"), &["stamp_ns"]).concat();
+    let all: Vec<i64> = all.iter().filter_map(|stamp| stamp.parse().ok()).collect();
+    let found = stamps(&topics["/odom"]);
+    assert!(found.is_sorted_by(|earlier, later| earlier < later));
+    assert!(found.iter().all(|stamp| all.contains(stamp)));
+    // Each bridge begins with the poses that are in the queue of an observer.
+    assert!(found.contains(&all[20]) && found.last() == all.last());
+    assert_eq!(late["/map"].last(), topics["/map"].last());
+    assert!(!late.contains_key("/odom"), "{late:?}");
+}
+
+#[test]
+fn a_managed_node_publishes_once_it_is_active() {
+    only_if!(has_ros());
+    let (run, domain) = (Run::of_recording().rate("1"), domain(14));
+    let options = ["--managed", "--ros-args", "-r", "__ns:=/car"];
+    let mut bridge = Program::bridge(&run, &domain, &options);
+    let mut node = Program::node(&domain, &["/car"]);
+    let idle = run.complete();
+    let said = bridge.await_end();
+    node.write("lifecycle");
+    for event in [
+        "{\"id\": 2, \"label\": \"inactive\"}}}",
+        "{\"id\": 3, \"label\": \"active\"}}}",
+    ] {
+        node.await_words(&format!("\"goal_state\": {event}"));
+    }
+    let again = run.clone().option("--fresh").complete();
+    assert_whole(&mut bridge);
+    let topics = received(node);
+
+    assert_eq!(idle, again);
+    let held_back = "24 poses not published, since the node was not active";
+    assert!(said.ends_with(held_back), "{said}");
+    assert_odometry(&topics["/car/odom"], &run);
+}
+
+#[test]
+fn the_launch_file_starts_the_bridge() {
+    let example = format!("{PROJECT}/examples/ros2.launch.py");
+    let words = script("reach/ros2/launch.py")
+        .arg(example)
+        .output()
+        .unwrap();
+    let words = String::from_utf8(words.stdout).unwrap();
+    let words: Vec<&str> = words.lines().collect();
+    assert_eq!(words[..4], ["gyre", "ros2", "out/radar", "--wait"]);
+    Program::bridge(&Run::small(), &domain(18), &words[4..]).interrupt();
+}
+
+#[test]
+fn a_node_of_ros_receives_the_velocities_by_doppler_and_what_motions_rest_on() {
+    only_if!(has_ros());
+    let run = without_doppler().set("doppler.kind=auto").rate("2");
+    let domain = domain(15);
+    let mut bridge = Program::bridge(&run, &domain, &[]);
+    let node = Program::node(&domain, &["/"]);
+    run.complete();
+    assert_whole(&mut bridge);
+    let topics = received(node);
+
+    let velocities = &topics["/doppler"];
+    assert!(velocities.len() as u64 >= run.count("doppler/motions"));
+    let linear = |message: &Value| {
+        let linear = &message["twist"]["twist"]["linear"];
+        (
+            stamp_ns(&message["header"]),
+            ["x", "y"].map(|axis| number(&linear[axis])),
+        )
+    };
+    let of_poses: BTreeMap<i64, [f64; 2]> = topics["/odom"].iter().map(linear).collect();
+    for velocity in velocities {
+        assert_eq!(velocity["header"]["frame_id"], "radar");
+        // The other velocity is the mean since the previous scan.
+        let (stamp, velocity_mps) = linear(velocity);
+        let apart = [0, 1].map(|axis: usize| (velocity_mps[axis] - of_poses[&stamp][axis]).abs());
+        let is_first = velocity == &velocities[0];
+        assert!(
+            is_first || apart.iter().all(|it| *it < 1.0),
+            "{velocity} {apart:?}"
+        );
+        let twist = &velocity["twist"];
+        let variances = [0, 7, 35].map(|it: usize| number(&twist["covariance"][it]));
+        assert!(variances[0] < 1.0 && variances[2] == UNKNOWN, "{velocity}");
+    }
+    let parts = topics["/diagnostics"].iter().map(|it| &it["status"]);
+    let parts = parts.flat_map(|it| it.as_array().unwrap());
+    let of_motions = parts.filter(|part| part["name"] == "gyre: motion");
+    let newest = of_motions.last().unwrap();
+    assert_eq!(newest["message"], "radar and others", "{newest}");
+    let values = newest["values"].as_array().unwrap();
+    let agrees = values.iter().find(|it| it["key"] == "Doppler agrees");
+    let agrees: Option<u64> = agrees.and_then(|it| it["value"].as_str()?.parse().ok());
+    assert!(agrees > Some(15), "{newest}");
+}
+
+#[test]
+#[ignore = ".ci/nightly: ten minutes"]
+fn a_node_of_ros_receives_all_poses_of_ten_minutes() {
+    only_if!(has_ros());
+    let scans = 2400;
+    let simulation = format!(
+        "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = {scans}\n{}",
+        recording::SENSOR
+    );
+    let (run, domain) = (Run::configured(&simulation).rate("1"), domain(16));
+    let mut bridge = Program::bridge(&run, &domain, &[]);
+    let node = Program::node(&domain, &["/"]);
+    assert!(run.command().output().unwrap().status.success());
+    assert_whole(&mut bridge);
+    let topics = received(node);
+    assert_odometry(&topics["/odom"], &run);
+    assert_eq!(topics["/odom"].len(), scans);
+    assert_eq!(topics["sensor"], topics["/odom"]);
 }

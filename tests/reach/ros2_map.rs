@@ -1,18 +1,20 @@
 //! Tests of the messages to a peer in ROS 2 from a run with SLAM: a frame of the map, and the map.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 
 use crate::{
     common::{Run, finished, recording},
     reach::{
         only_if,
-        ros2::{Program, can_speak, domain, number, received, transforms},
+        ros2::{Program, can_speak, domain, has_ros, number, received, stamp_ns, transforms},
     },
 };
 
 #[test]
 fn a_run_with_slam_has_a_map_frame_and_a_map() {
-    only_if!(can_speak());
+    only_if!(can_speak() && has_ros());
     let data = recording::around_a_block();
     let run = Run::small().data(data).set("slam.kind=graph").rate("20");
     let domain = domain(1);
@@ -23,19 +25,28 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
         "world,odo,car,top",
         "--mounting",
         "1,0,90",
+        "--tf-ahead-s",
+        "0.25",
     ];
-    let bridge = Program::bridge(&run, &domain, &options);
+    let mut bridge = Program::bridge(&run, &domain, &options);
     let peer = Program::peer("observer.py", &[&domain, "/car"]);
+    let node = Program::node(&domain, &["/car"]);
     run.complete();
-    let topics = received(peer);
-    bridge.interrupt();
+    bridge.await_end();
+    let mut topics = received(node);
+    topics.extend(received(peer));
 
     let odometry = &topics["/car/odom"];
     assert_eq!(odometry[0]["header"]["frame_id"], "odo");
-    let transformed = transforms(&topics["/tf"]).into_iter();
-    let frames: Vec<String> = transformed.map(|it| it.1).collect();
-    let has = |of: &str| frames.iter().any(|it| it == of);
-    assert!(has("world -> odo") && has("odo -> car"));
+    let transformed = transforms(&topics["/tf"]);
+    let stamps = |of: &str, ahead_ns| -> Vec<i64> {
+        let found = transformed.iter().filter(|it| it.1 == of);
+        found.map(|it| it.0 - ahead_ns).collect()
+    };
+    let of_odometry = stamps("odo -> car", 0);
+    assert_eq!(of_odometry.len(), odometry.len());
+    // The transform of the map is dated ahead.
+    assert_eq!(stamps("world -> odo", 250_000_000), of_odometry);
     // The radar looks to the left of the car, which so drives to the right of the radar's first
     // scan.
     let (_, mounted, values) = &transforms(&topics["/tf_static"])[0];
@@ -53,6 +64,44 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
     };
     let (turned, as_of_radar) = (share(|[x, y]| [1.0 - y, x]), share(|place| place));
     assert!(turned > 0.8 && as_of_radar < 0.5, "{turned} {as_of_radar}");
+}
+
+#[test]
+fn a_node_of_ros_receives_the_places_in_the_map_of_an_earlier_drive() {
+    only_if!(has_ros());
+    let data = recording::around_a_block();
+    let earlier = Run::small().data(data).set("slam.kind=graph");
+    earlier.complete();
+    let map = earlier.folder().join("map");
+    finished!["map", earlier.out(), "--format=folder", "--out", &map].succeeded();
+    let run = Run::small().data(data).set("slam.kind=graph").rate("10");
+    let run = run.set(&format!("slam.map='{}'", map.display()));
+    let domain = domain(17);
+    let mut bridge = Program::bridge(&run, &domain, &[]);
+    let node = Program::node(&domain, &["/"]);
+    run.complete();
+    bridge.await_end();
+    let topics = received(node);
+
+    let fixes = &topics["/map_fix"];
+    assert!(fixes.len() > 40, "{}", fixes.len());
+    let place = |message: &Value| {
+        let at = &message["pose"]["pose"]["position"];
+        (
+            stamp_ns(&message["header"]),
+            ["x", "y"].map(|axis| number(&at[axis])),
+        )
+    };
+    let poses: BTreeMap<i64, [f64; 2]> = topics["/odom"].iter().map(place).collect();
+    for fix in fixes {
+        assert_eq!(fix["header"]["frame_id"], "saved_map");
+        // The drive is the same, and its first scan is the first keyframe of the map.
+        let (stamp, at) = place(fix);
+        let apart = [0, 1].map(|axis: usize| (at[axis] - poses[&stamp][axis]).abs());
+        assert!(apart.iter().all(|it| *it < 1.5), "{fix} {apart:?}");
+        let variance = number(&fix["pose"]["covariance"][0]);
+        assert!(variance > 0.0 && variance < 1.0, "{variance}");
+    }
 }
 
 const FREE: u8 = 0;

@@ -8,7 +8,7 @@ use crate::{
     common::{Run, odometry, recording},
     reach::{
         only_if,
-        ros2::{Program, can_speak, domain, number, received, stamp_ns},
+        ros2::{Program, can_speak, domain, has_ros, number, received, stamp_ns},
     },
 };
 
@@ -41,18 +41,20 @@ fn seen(array: &Value) -> Places {
 
 #[test]
 fn a_node_of_ros_receives_the_objects_of_each_scan_as_detections_and_markers() {
-    only_if!(can_speak());
+    only_if!(can_speak() && has_ros());
     let run = Run::small().data(recording::around_a_block());
     let run = run.set("objects.kind=tracks").rate("10");
     let domain = domain(10);
     let options = ["--namespace", "/car", "--mounting", "1,0,90"];
-    let bridge = Program::bridge(&run, &domain, &options);
+    let mut bridge = Program::bridge(&run, &domain, &options);
     let peer = Program::peer("observer.py", &[&domain, "/car"]);
+    let node = Program::node(&domain, &["/car"]);
     run.complete();
-    let topics = received(peer);
-    let said = bridge.interrupt();
-    let is_whole = |line: &String| line.contains("the objects of 0 scans and 0 poses missed; 0");
-    assert!(said.iter().any(is_whole), "{said:?}");
+    let said = bridge.await_end();
+    let mut topics = received(node);
+    topics.extend(received(peer));
+    let whole = "the objects of 0 scans and 0 poses missed; 0";
+    assert!(said.contains(whole), "{said}");
 
     let (arrays, drawn) = (&topics["/car/objects"], &topics["/car/object_markers"]);
     assert_eq!(arrays.len(), topics["/car/odom"].len());

@@ -201,7 +201,7 @@ pub struct Ros2Arguments {
     /// alone. Default: all networks, or as in ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE.
     #[arg(long, value_name = "ADDRESS")]
     pub interface: Option<String>,
-    /// The namespace of the topics odom, map, objects and object_markers.
+    /// The namespace of the node and of its topics, but for those that begin with `/`.
     #[arg(long, value_name = "NAME", default_value = "/")]
     pub namespace: String,
     #[command(flatten)]
@@ -210,12 +210,32 @@ pub struct Ros2Arguments {
     /// robot_localization. The radar's transform stays.
     #[arg(long)]
     pub no_tf: bool,
+    /// Date the transform of the map ahead by this time, so that it is valid until the next pose
+    /// (Nav2's transform_tolerance).
+    #[arg(long, default_value = "0", value_name = "S", value_parser = seconds)]
+    pub tf_ahead_s: Duration,
+    /// Publish the time of a replay on /clock, with each pose, for nodes with use_sim_time.
+    #[arg(long)]
+    pub clock: bool,
+    /// Be a managed node: publish only while its lifecycle is active. It begins unconfigured.
+    #[arg(long)]
+    pub managed: bool,
     /// Publish no map, which takes a tenth of a processor at most.
     #[arg(long)]
     pub no_map: bool,
     /// Wait for a run that has not started yet.
     #[arg(long)]
     pub wait: bool,
+    /// The arguments that a launch file of ROS 2 passes: -r __node:=NAME, -r __ns:=NAMESPACE, and
+    /// -p with base_frame, lidar_odom_frame, map_frame, radar_frame or publish_odom_tf.
+    #[arg(
+        long,
+        num_args = 0..,
+        allow_hyphen_values = true,
+        value_terminator = "--",
+        value_name = "ARGUMENT"
+    )]
+    pub ros_args: Vec<String>,
 }
 
 /// The ends of a link.

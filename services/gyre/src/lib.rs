@@ -20,6 +20,8 @@ pub mod progress;
 pub mod record;
 #[cfg(feature = "ros2")]
 pub mod ros2;
+#[cfg(feature = "ros2")]
+mod ros_args;
 pub mod run;
 pub mod simulate;
 pub mod stage;

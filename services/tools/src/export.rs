@@ -167,7 +167,7 @@ impl<'a> Trajectory<'a> {
             bag.write(&fixed, stamp_ns, &vehicle.mounted(stamp_ns))?;
         }
         let corrected = place.map_from_odometry.as_ref();
-        let transforms = vehicle.transforms(stamp_ns, &place.pose, corrected);
+        let transforms = vehicle.transforms(stamp_ns, &place.pose, corrected, 0);
         let odometry = vehicle.odometry(stamp_ns, &place.pose);
         bag.write(&self.odometry, stamp_ns, &odometry)?;
         bag.write(&self.transforms, stamp_ns, &transforms)?;

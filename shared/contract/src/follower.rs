@@ -138,4 +138,14 @@ impl FixHeader {
         let is_known = self.status != fix_status::LOST;
         is_known.then(|| pose(self.x_m, self.y_m, self.yaw_rad))
     }
+
+    /// Returns the pose if the scan was found in the map, not predicted from an earlier fix.
+    pub fn measured(&self) -> Option<UncertainMotion> {
+        let is_measured = [fix_status::FOUND, fix_status::TRACKED].contains(&self.status);
+        let motion = self.pose().filter(|_| is_measured)?;
+        Some(UncertainMotion {
+            motion,
+            covariance: covariance::unpack(&self.covariance),
+        })
+    }
 }

@@ -1,4 +1,4 @@
-"""Prints what a node of ROS 2 receives of a run, a line of JSON a message, until its input ends.
+"""Prints the messages of a run for which `node.py` lacks packages, a line of JSON a message, until its input ends.
 
 Arguments: the domain, the namespace, and topics that nobody publishes. The first line is `{"ready": true}` once publishers of all others are there.
 """
@@ -8,7 +8,6 @@ import sys
 import threading
 import time
 from dataclasses import asdict
-from itertools import groupby
 
 import ros
 from cyclonedds.sub import DataReader
@@ -18,31 +17,19 @@ participant, kept = ros.join(domain)
 readers = {
     name: DataReader(participant, ros.topic(participant, name, kind, **keep), qos=ros.qos(**keep))
     for name, kind, keep in [
-        (namespace + "/odom", ros.Odometry, {"depth": 1000}),
         ("/tf", ros.TFMessage, {"depth": 1000}),
         ("/tf_static", ros.TFMessage, {"latched": True}),
-        ("/diagnostics", ros.DiagnosticArray, {}),
         (namespace + "/objects", ros.Detection3DArray, {"depth": 1000}),
-        (namespace + "/object_markers", ros.MarkerArray, {"depth": 1000}),
-        (namespace + "/map", ros.OccupancyGrid, {"depth": 1, "latched": True}),
     ]
 }
 asked = threading.Event()
 threading.Thread(target=lambda: (sys.stdin.read(), asked.set()), daemon=True).start()
 
 
-def plain(message):
-    """The message as JSON, the cells of a map as pairs of a value and how often it follows."""
-    fields = asdict(message)
-    if isinstance(message, ros.OccupancyGrid):
-        fields["data"] = [(value, len(list(cells))) for value, cells in groupby(bytes(message.data))]
-    return fields
-
-
 def take():
     for name, reader in readers.items():
         for message in reader.take(N=1000):
-            print(json.dumps({"topic": name, "message": plain(message)}))
+            print(json.dumps({"topic": name, "message": asdict(message)}))
     sys.stdout.flush()
 
 

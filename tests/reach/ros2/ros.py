@@ -130,23 +130,6 @@ class TFMessage(IdlStruct, typename="tf2_msgs.msg.dds_.TFMessage_"):
 
 
 @dataclass
-class MapMetaData(IdlStruct, typename="nav_msgs.msg.dds_.MapMetaData_"):
-    map_load_time: Time
-    resolution: float32
-    width: uint32
-    height: uint32
-    origin: Pose
-
-
-@dataclass
-class OccupancyGrid(IdlStruct, typename="nav_msgs.msg.dds_.OccupancyGrid_"):
-    header: Header
-    info: MapMetaData
-    # int8 in ROS 2; as bytes they are read at once.
-    data: sequence[uint8]
-
-
-@dataclass
 class ObjectHypothesis(IdlStruct, typename="vision_msgs.msg.dds_.ObjectHypothesis_"):
     class_id: str
     score: float64
@@ -176,88 +159,6 @@ class Detection3D(IdlStruct, typename="vision_msgs.msg.dds_.Detection3D_"):
 class Detection3DArray(IdlStruct, typename="vision_msgs.msg.dds_.Detection3DArray_"):
     header: Header
     detections: sequence[Detection3D]
-
-
-@dataclass
-class ColorRGBA(IdlStruct, typename="std_msgs.msg.dds_.ColorRGBA_"):
-    r: float32
-    g: float32
-    b: float32
-    a: float32
-
-
-@dataclass
-class Duration(IdlStruct, typename="builtin_interfaces.msg.dds_.Duration_"):
-    sec: int32
-    nanosec: uint32
-
-
-@dataclass
-class CompressedImage(IdlStruct, typename="sensor_msgs.msg.dds_.CompressedImage_"):
-    header: Header
-    format: str
-    data: sequence[uint8]
-
-
-@dataclass
-class UVCoordinate(IdlStruct, typename="visualization_msgs.msg.dds_.UVCoordinate_"):
-    u: float32
-    v: float32
-
-
-@dataclass
-class MeshFile(IdlStruct, typename="visualization_msgs.msg.dds_.MeshFile_"):
-    filename: str
-    data: sequence[uint8]
-
-
-@dataclass
-class Marker(IdlStruct, typename="visualization_msgs.msg.dds_.Marker_"):
-    header: Header
-    ns: str
-    id: int32
-    type: int32
-    action: int32
-    pose: Pose
-    scale: Vector3
-    color: ColorRGBA
-    lifetime: Duration
-    frame_locked: bool
-    points: sequence[Point]
-    colors: sequence[ColorRGBA]
-    texture_resource: str
-    texture: CompressedImage
-    uv_coordinates: sequence[UVCoordinate]
-    text: str
-    mesh_resource: str
-    mesh_file: MeshFile
-    mesh_use_embedded_materials: bool
-
-
-@dataclass
-class MarkerArray(IdlStruct, typename="visualization_msgs.msg.dds_.MarkerArray_"):
-    markers: sequence[Marker]
-
-
-@dataclass
-class KeyValue(IdlStruct, typename="diagnostic_msgs.msg.dds_.KeyValue_"):
-    key: str
-    value: str
-
-
-@dataclass
-class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs.msg.dds_.DiagnosticStatus_"):
-    level: uint8
-    name: str
-    message: str
-    hardware_id: str
-    values: sequence[KeyValue]
-
-
-@dataclass
-class DiagnosticArray(IdlStruct, typename="diagnostic_msgs.msg.dds_.DiagnosticArray_"):
-    header: Header
-    status: sequence[DiagnosticStatus]
 
 
 @dataclass

@@ -3,45 +3,44 @@
 use std::thread;
 
 use gyre_client::{Manifest, Next, Run, RunError};
-use gyre_contract::{Correction, Message, Objects, ObjectsHeader, Pose, PoseHeader};
-use gyre_ros2_messages::{
-    nav_msgs::Odometry, objects, tf2_msgs::TFMessage, vision_msgs::Detection3DArray,
-    visualization_msgs::MarkerArray,
+use gyre_contract::{
+    Correction, Fix, FixHeader, Item, Masked, MaskedHeader, Message, Objects, ObjectsHeader, Pose,
+    PoseHeader, Witness,
 };
+use gyre_ros2_messages::{
+    builtin_interfaces::Time,
+    geometry_msgs::{PoseWithCovarianceStamped, TwistWithCovarianceStamped},
+    objects,
+    rosgraph_msgs::Clock,
+};
+
+use serde::Serialize;
 
 use crate::{
-    live_map::MapTopic,
+    RunSettings, live_map,
     outlet::Outlet,
-    run_state::{POLL_INTERVAL, RunPhase, RunState, Shared},
+    run_state::{Counts, POLL_INTERVAL, RunPhase, RunState, Shared},
+    topics::{ObjectTopics, PoseTopics, RunTopics},
 };
 
-pub struct Topics {
-    pub poses: PoseTopics,
-    pub objects: ObjectTopics,
-    pub map: Option<MapTopic>,
-}
-
-pub struct PoseTopics {
-    pub odometry: Outlet<Odometry>,
-    /// `None` where another program provides the transforms.
-    pub transforms: Option<Outlet<TFMessage>>,
-}
-
-pub struct ObjectTopics {
-    pub detections: Outlet<Detection3DArray>,
-    pub markers: Outlet<MarkerArray>,
-}
-
-pub fn follow_runs(shared: &Shared, mut topics: Topics, say: fn(&str)) {
+pub fn follow_runs(shared: &Shared, mut topics: RunTopics, say: fn(&str)) {
     while !shared.is_stopping() {
-        let Ok(run) = Run::open(&shared.out) else {
+        let Ok(run) = Run::open(&shared.settings.out) else {
             // There is no run yet.
             thread::sleep(POLL_INTERVAL);
             continue;
         };
         let manifest = run.manifest();
         shared.begin(manifest.window.slam);
-        follow_run(shared, manifest, &mut topics, say);
+        let settings = (shared.settings.of_run)(&shared.settings.out);
+        match own_topic(&settings, &topics.poses) {
+            Some(sentence) => {
+                say(&sentence);
+                shared.state().notice = Some(sentence);
+                await_end(shared, &run);
+            }
+            None => follow_run(shared, manifest, &settings, &mut topics, say),
+        }
         if run.has_ended() {
             shared.state().phase = RunPhase::Ended;
             let sentence = sentence(&shared.state());
@@ -50,39 +49,79 @@ pub fn follow_runs(shared: &Shared, mut topics: Topics, say: fn(&str)) {
     }
 }
 
+/// Returns a sentence if the run would receive its own odometry as the speed of its wheels.
+fn own_topic(settings: &Result<RunSettings, String>, topics: &PoseTopics) -> Option<String> {
+    let mut received = settings.iter().flat_map(|it| &it.sensor_topics);
+    let topic = received.find(|topic| topics.odometry.is(topic))?;
+    Some(format!(
+        "the run is not published: it receives its wheels from {topic}, the topic of its own odometry; start the bridge with --namespace"
+    ))
+}
+
 /// Follows the topics of a run in a thread each, until the run has ended or the bridge stops.
-fn follow_run(shared: &Shared, manifest: &Manifest, topics: &mut Topics, say: fn(&str)) {
+fn follow_run(
+    shared: &Shared,
+    manifest: &Manifest,
+    settings: &Result<RunSettings, String>,
+    topics: &mut RunTopics,
+    say: fn(&str),
+) {
     let (name, window) = (manifest.prefix.as_str(), &manifest.window);
-    let Topics {
+    let is = |of: fn(&RunSettings) -> bool| settings.as_ref().is_ok_and(of);
+    let RunTopics {
         poses,
         objects,
+        doppler,
+        fixes,
         map,
     } = topics;
+    poses.has_clock = is(|it| it.is_replay);
+    if poses.clock.is_some() && !poses.has_clock {
+        say("/clock is not published: the run does not play a recording");
+    }
+    let has_doppler = is(|it| it.has_doppler);
     thread::scope(|threads| {
-        threads.spawn(move || {
-            until_end(shared, name, |run| follow_poses(shared, run, poses, say));
-        });
+        let follow_topic = |follow: &mut dyn FnMut(&Run) -> Result<(), RunError>| {
+            until_end(shared, name, follow);
+        };
+        threads.spawn(move || follow_topic(&mut |run| follow_poses(shared, run, poses, say)));
         if window.objects {
             threads.spawn(move || {
-                until_end(shared, name, |run| {
+                follow_topic(&mut |run| {
                     each_message::<Objects>(shared, run, |header| {
                         objects.publish(shared, header, say);
                     })
                 });
             });
         }
+        if has_doppler {
+            threads.spawn(move || {
+                follow_topic(&mut |run| {
+                    each_message::<Masked>(shared, run, |scan| {
+                        publish_doppler(doppler, shared, scan, say);
+                    })
+                });
+            });
+        }
+        if window.localises {
+            threads.spawn(move || {
+                follow_topic(&mut |run| {
+                    each_message::<Fix>(shared, run, |fix| publish_fix(fixes, shared, fix, say))
+                });
+            });
+        }
         if window.slam {
             threads.spawn(move || {
-                until_end(shared, name, |run| {
+                follow_topic(&mut |run| {
                     each_message::<Correction>(shared, run, |correction| {
                         shared.state().map_from_odometry = Some(correction.map_from_odometry());
                     })
                 });
             });
-            if let Some(map) = map {
+            if let Some(maps) = map {
                 threads.spawn(move || {
-                    until_end(shared, name, |run| {
-                        map.follow(shared, run);
+                    follow_topic(&mut |run| {
+                        live_map::follow(shared, run, settings, maps);
                         Ok(())
                     });
                 });
@@ -93,9 +132,9 @@ fn follow_run(shared: &Shared, manifest: &Manifest, topics: &mut Topics, say: fn
 
 /// Calls `follow` with the run of this name, again after a failure, and waits for the end of the
 /// run: until the results are written.
-fn until_end(shared: &Shared, name: &str, mut follow: impl FnMut(&Run) -> Result<(), RunError>) {
+fn until_end(shared: &Shared, name: &str, follow: &mut dyn FnMut(&Run) -> Result<(), RunError>) {
     while !shared.is_stopping() {
-        let followed = match Run::open(&shared.out) {
+        let followed = match Run::open(&shared.settings.out) {
             Ok(run) if run.manifest().prefix != name => return,
             Ok(run) => follow(&run).map(|()| await_end(shared, &run)),
             Err(error) => Err(error),
@@ -132,9 +171,21 @@ fn sentence(state: &RunState) -> String {
     let (poses, first) = (state.poses.published, state.poses.first.unwrap_or_default());
     let (objects, maps, unsent) = (state.objects.published, state.maps, state.unsent);
     let (missed, missed_objects) = (state.poses.missed(), state.objects.missed());
-    format!(
+    let mut sentence = format!(
         "the run has ended: {poses} poses from number {first} on, {maps} maps and the objects of {objects} scans published, the objects of {missed_objects} scans and {missed} poses missed; {unsent} messages not sent because readers were behind"
-    )
+    );
+    for (count, reason) in [
+        (state.unread, "published while odom had no reader"),
+        (
+            state.poses.held_back,
+            "not published, since the node was not active",
+        ),
+    ] {
+        if count > 0 {
+            sentence += &format!("; {count} poses {reason}");
+        }
+    }
+    sentence
 }
 
 /// Calls `take` with the header of each message of a topic, until the stream ends or the bridge
@@ -159,40 +210,116 @@ impl PoseTopics {
     /// Publishes a pose as odometry and as transforms; the map's transform comes from the loops of
     /// SLAM.
     fn publish(&mut self, shared: &Shared, pose: &PoseHeader, say: fn(&str)) {
+        let is_active = shared.is_active();
         let (stamp_ns, map_from_odometry) = {
             let mut state = shared.state();
-            // The pose was published before the stream was interrupted.
-            if !state.poses.count(&pose.item) {
+            // False also for a pose that was published before the stream was interrupted.
+            if !state.poses.count(&pose.item, is_active) {
                 return;
             }
+            state.motions.add(&pose.motion.refinement);
             let stamp_ns = state.stamp_ns(pose.item.stamp_ns, say);
             (stamp_ns, state.map_from_odometry)
         };
-        let (vehicle, mut unsent) = (&shared.vehicle, 0);
+        let (vehicle, mut unsent) = (&shared.settings.vehicle, 0);
+        // The time comes first: what has a later stamp lies in the future of its readers.
+        if let Some(topic) = self.clock.as_mut().filter(|_| self.has_clock) {
+            let clock = Time::from_ns(stamp_ns);
+            unsent += u64::from(!topic.send(Clock { clock }));
+        }
         if let Some(topic) = &mut self.transforms {
-            let transforms = vehicle.transforms(stamp_ns, pose, map_from_odometry.as_ref());
+            let ahead_ns = shared.settings.ahead_ns;
+            let map = map_from_odometry.as_ref();
+            let transforms = vehicle.transforms(stamp_ns, pose, map, ahead_ns);
             unsent += u64::from(!topic.send(transforms));
         }
+        let is_unread = !self.odometry.has_reader();
         unsent += u64::from(!self.odometry.send(vehicle.odometry(stamp_ns, pose)));
-        shared.state().unsent += unsent;
+        let mut state = shared.state();
+        state.unsent += unsent;
+        state.unread += u64::from(is_unread);
     }
 }
 
 impl ObjectTopics {
     /// Publishes the objects of a scan, even an empty list.
     fn publish(&mut self, shared: &Shared, header: &ObjectsHeader, say: fn(&str)) {
+        let is_active = shared.is_active();
         let stamp_ns = {
             let mut state = shared.state();
-            // They were published before the stream was interrupted.
-            if !state.objects.count(&header.item) {
+            // False also for objects that were published before the stream was interrupted.
+            if !state.objects.count(&header.item, is_active) {
                 return;
             }
             state.stamp_ns(header.item.stamp_ns, say)
         };
-        let (vehicle, listed) = (&shared.vehicle, header.list());
+        let (vehicle, listed) = (&shared.settings.vehicle, header.list());
         let detections = objects::detections(stamp_ns, vehicle, listed);
         let markers = objects::markers(stamp_ns, vehicle, listed);
         let sent = [self.detections.send(detections), self.markers.send(markers)];
         shared.state().unsent += sent.map(|is_sent| u64::from(!is_sent)).iter().sum::<u64>();
+    }
+}
+
+/// Publishes the velocity of a scan that Doppler has measured.
+fn publish_doppler(
+    topic: &mut Outlet<TwistWithCovarianceStamped>,
+    shared: &Shared,
+    scan: &MaskedHeader,
+    say: fn(&str),
+) {
+    let vehicle = &shared.settings.vehicle;
+    publish_some(
+        topic,
+        shared,
+        &scan.item,
+        say,
+        |state| &mut state.doppler,
+        |stamp_ns| {
+            let velocity = scan.of(Witness::Doppler)?;
+            Some(vehicle.doppler(stamp_ns, velocity))
+        },
+    );
+}
+
+/// Publishes the pose of a keyframe in the map of an earlier drive, if it was found there.
+fn publish_fix(
+    topic: &mut Outlet<PoseWithCovarianceStamped>,
+    shared: &Shared,
+    fix: &FixHeader,
+    say: fn(&str),
+) {
+    let vehicle = &shared.settings.vehicle;
+    publish_some(
+        topic,
+        shared,
+        &fix.item,
+        say,
+        |state| &mut state.fixes,
+        |stamp_ns| vehicle.fix(stamp_ns, fix),
+    );
+}
+
+/// Publishes what an item contains, if it contains something, and counts it.
+fn publish_some<M: Serialize>(
+    topic: &mut Outlet<M>,
+    shared: &Shared,
+    item: &Item,
+    say: fn(&str),
+    counts: fn(&mut RunState) -> &mut Counts,
+    message: impl FnOnce(i64) -> Option<M>,
+) {
+    let is_active = shared.is_active();
+    let mut state = shared.state();
+    if !counts(&mut state).count(item, is_active) {
+        return;
+    }
+    match message(state.stamp_ns(item.stamp_ns, say)) {
+        Some(message) => {
+            drop(state);
+            let is_sent = topic.send(message);
+            shared.state().unsent += u64::from(!is_sent);
+        }
+        None => counts(&mut state).was_empty(),
     }
 }

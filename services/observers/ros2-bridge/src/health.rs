@@ -29,29 +29,30 @@ pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
     while !shared.is_stopping() {
         if Instant::now() >= due {
             due = Instant::now() + PERIOD;
-            let answer = Control::of(&shared.out).and_then(|run| run.status());
+            let answer = Control::of(&shared.settings.out).and_then(|run| run.status());
             let state = shared.state().clone();
-            let out = shared.out.display().to_string();
-            diagnostics.send(array(&out, &state, answer.ok(), &mut before));
+            let mut array = array(&state, answer.ok(), &mut before);
+            let lifecycle = shared.lifecycle.as_ref();
+            let lifecycle =
+                lifecycle.map(|node| KeyValue::new("state of the node", node.state().label));
+            array.status[0].values.extend(lifecycle);
+            let out = shared.settings.out.display().to_string();
+            for part in &mut array.status {
+                part.hardware_id.clone_from(&out);
+            }
+            diagnostics.send(array);
         }
         std::thread::sleep(POLL_INTERVAL.min(due.saturating_duration_since(Instant::now())));
     }
 }
 
-fn array(
-    out: &str,
-    state: &RunState,
-    status: Option<Status>,
-    before: &mut LastCounts,
-) -> DiagnosticArray {
+fn array(state: &RunState, status: Option<Status>, before: &mut LastCounts) -> DiagnosticArray {
     let mut array = DiagnosticArray::default();
     array.header.stamp = Time::from_ns(clock::since_1970_ns());
     array.status.push(run(state, status.as_ref(), before));
+    array.status.extend(state.motions.diagnostic());
     let processes = status.iter().flat_map(|status| &status.processes);
     array.status.extend(processes.map(process));
-    for part in &mut array.status {
-        out.clone_into(&mut part.hardware_id);
-    }
     array
 }
 
@@ -82,11 +83,18 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
         ("poses missed", state.poses.missed()),
         ("objects published", state.objects.published),
         ("objects missed", state.objects.missed()),
+        ("poses without a reader", state.unread),
+        ("poses held back, not active", state.poses.held_back),
+        ("Doppler velocities published", state.doppler.published),
+        ("Doppler velocities missed", state.doppler.missed()),
+        ("fixes published", state.fixes.published),
+        ("fixes missed", state.fixes.missed()),
+        ("keyframes not found in the map", state.fixes.empty),
         ("messages not sent", state.unsent),
         ("maps published", state.maps),
     ];
-    let of_bridge = of_bridge.map(|(key, count)| value(key, count));
-    let mut part = part("gyre", level, message);
+    let of_bridge = of_bridge.map(|(key, count)| KeyValue::new(key, count));
+    let mut part = DiagnosticStatus::new("gyre", level, message);
     part.values = status.map(figures).unwrap_or_default();
     part.values.extend(of_bridge);
     part
@@ -94,15 +102,19 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
 
 fn figures(status: &Status) -> Vec<KeyValue> {
     let mut figures = vec![
-        value("phase", status.phase.name()),
-        value("mode", if status.live { "live" } else { "lossless" }),
-        value("uptime_s", format!("{:.1}", status.uptime_s)),
-        value("poses", status.poses),
-        value("dropped", status.dropped),
+        KeyValue::new("phase", status.phase.name()),
+        KeyValue::new("mode", if status.live { "live" } else { "lossless" }),
+        KeyValue::new("uptime_s", format!("{:.1}", status.uptime_s)),
+        KeyValue::new("poses", status.poses),
+        KeyValue::new("dropped", status.dropped),
     ];
-    figures.extend(status.published.map(|scans| value("published", scans)));
+    figures.extend(
+        status
+            .published
+            .map(|scans| KeyValue::new("published", scans)),
+    );
     let age = status.last_pose_s.map(|age_s| format!("{age_s:.2}"));
-    figures.extend(age.map(|age_s| value("last_pose_s", age_s)));
+    figures.extend(age.map(|age_s| KeyValue::new("last_pose_s", age_s)));
     figures
 }
 
@@ -113,32 +125,16 @@ fn process(process: &ProcessStatus) -> DiagnosticStatus {
         Activity::Silent | Activity::Ended => ERROR,
     };
     let name = format!("gyre: {}", process.name);
-    let mut part = part(&name, level, process.activity.name().to_owned());
+    let mut part = DiagnosticStatus::new(&name, level, process.activity.name().to_owned());
     part.values = vec![
-        value("pid", process.pid),
-        value("restarts", process.restarts),
-        value("uptime_s", format!("{:.1}", process.uptime_s)),
+        KeyValue::new("pid", process.pid),
+        KeyValue::new("restarts", process.restarts),
+        KeyValue::new("uptime_s", format!("{:.1}", process.uptime_s)),
     ];
     let death = process.last_death.as_ref();
     part.values
-        .extend(death.map(|cause| value("last_death", cause)));
+        .extend(death.map(|cause| KeyValue::new("last_death", cause)));
     part
-}
-
-fn part(name: &str, level: u8, message: String) -> DiagnosticStatus {
-    DiagnosticStatus {
-        level,
-        name: name.to_owned(),
-        message,
-        ..DiagnosticStatus::default()
-    }
-}
-
-fn value(key: &str, value: impl ToString) -> KeyValue {
-    KeyValue {
-        key: key.to_owned(),
-        value: value.to_string(),
-    }
 }
 
 #[cfg(test)]
@@ -185,7 +181,7 @@ mod tests {
     fn levels_follow_the_run_and_its_processes() {
         let (mut before, mut state) = (LastCounts::default(), RunState::default());
         let mut levels = |state: &RunState, status| {
-            let parts = array("out", state, status, &mut before).status;
+            let parts = array(state, status, &mut before).status;
             parts.iter().map(|part| part.level).collect::<Vec<_>>()
         };
         assert_eq!(levels(&state, None), [STALE]);

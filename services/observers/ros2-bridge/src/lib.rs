@@ -6,12 +6,17 @@
 mod bridge;
 mod following;
 mod health;
+mod lifecycle;
 mod live_map;
+mod motions;
 mod node;
 mod outlet;
 mod run_state;
+mod services;
 mod settings;
 pub mod source;
+mod topics;
+mod wakeups;
 
 pub use bridge::Bridge;
-pub use settings::{MapSettings, MapSettingsOf, Settings};
+pub use settings::{MapSettings, RunSettings, Settings};

@@ -15,7 +15,7 @@ use gyre_slam::{
 };
 
 use crate::{
-    MapSettings, MapSettingsOf,
+    MapSettings, RunSettings,
     outlet::Outlet,
     run_state::{POLL_INTERVAL, Shared},
 };
@@ -39,21 +39,18 @@ struct LiveMap {
     closed: usize,
 }
 
-pub struct MapTopic {
-    pub settings: MapSettingsOf,
-    pub maps: Outlet<OccupancyGrid>,
-}
-
-impl MapTopic {
-    /// Publishes the map of a run when it has new keyframes, until the run ends.
-    pub fn follow(&mut self, shared: &Shared, run: &Run) {
-        let settings = (self.settings)(&shared.out).map_err(LiveMapError::from);
-        let followed =
-            settings.and_then(|settings| publish(shared, run, &settings, &mut self.maps));
-        // Not tried again: that would read all keyframes each time.
-        if let Err(error) = followed {
-            shared.state().notice = Some(format!("the map is not published: {error}"));
-        }
+/// Publishes the map of a run when it has new keyframes, until the run ends.
+pub fn follow(
+    shared: &Shared,
+    run: &Run,
+    settings: &Result<RunSettings, String>,
+    maps: &mut Outlet<OccupancyGrid>,
+) {
+    let settings = settings.as_ref().map_err(|error| error.as_str().into());
+    let map = settings.and_then(|it| it.map.as_ref().ok_or("slam.kind is none".into()));
+    // Not tried again: that would read all keyframes each time.
+    if let Err(error) = map.and_then(|settings| publish(shared, run, settings, maps)) {
+        shared.state().notice = Some(format!("the map is not published: {error}"));
     }
 }
 
@@ -63,22 +60,23 @@ fn publish(
     settings: &MapSettings,
     maps: &mut Outlet<OccupancyGrid>,
 ) -> Result<(), LiveMapError> {
-    let mut map = LiveMap::open(&shared.out, settings, *shared.vehicle.mounting.radar())?;
+    let (out, vehicle) = (&shared.settings.out, &shared.settings.vehicle);
+    let mut map = LiveMap::open(out, settings, *vehicle.mounting.radar())?;
     let mut due = Instant::now();
     // A last time when the logs are complete.
     let mut ended = false;
     while !ended && !shared.is_stopping() {
         ended = run.has_ended() || map.has_ended();
-        if !ended && Instant::now() < due {
+        if !ended && (Instant::now() < due || !shared.is_active()) {
             std::thread::sleep(POLL_INTERVAL);
             continue;
         }
         let begun = Instant::now();
-        if map.update(&shared.out)? {
+        if shared.is_active() && map.update(out)? {
             let grid = grid(&mut map.evidence)?;
             let is_sent = maps.send(occupancy_grid(
                 clock::since_1970_ns(),
-                &shared.vehicle.frames.map,
+                &vehicle.frames.map,
                 grid.cell_m,
                 [grid.columns, grid.rows],
                 grid.corner_m,

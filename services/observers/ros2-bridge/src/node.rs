@@ -5,7 +5,8 @@ use std::{error::Error, fmt::Display, net::IpAddr, time::Duration};
 use gyre_client::RunError;
 use gyre_ros2_messages::{Domain, Ros2Message};
 use ros2_client::{
-    Context, MessageTypeName, Name, NodeName, NodeOptions, QosProfile, Subscription,
+    Context, Message, MessageTypeName, Name, NodeName, NodeOptions, QosProfile, Server,
+    ServiceMapping, ServiceTypeName, Subscription,
     dds::rustdds::DomainParticipantBuilder,
     qos::{Durability, History, Reliability, WhenFull},
 };
@@ -14,6 +15,9 @@ use crate::outlet::Outlet;
 
 /// The longest wait for slow readers, after which a message is dropped and counted.
 const MAX_WAIT: Duration = Duration::from_millis(100);
+
+/// Requests that are kept until they are answered.
+const REQUESTS: usize = 10;
 
 pub struct Node {
     node: ros2_client::Node,
@@ -78,9 +82,48 @@ impl Node {
     ) -> Result<Outlet<M>, RunError> {
         let opened = self.open::<M>(topic, &keep.qos())?;
         let publisher = self.node.create_publisher(&opened, None);
+        let participant = self.context.domain_participant().clone();
+        let dds_name = self.dds_name(topic)?;
         publisher
-            .map(Outlet::new)
+            .map(|publisher| Outlet::new(publisher, participant, dds_name))
             .map_err(|e| topic_error(topic, &e))
+    }
+
+    /// Publishes to a topic if it is wanted.
+    pub fn publish_if<M: Ros2Message>(
+        &mut self,
+        is_wanted: bool,
+        topic: &str,
+        keep: Keep,
+    ) -> Result<Option<Outlet<M>>, RunError> {
+        is_wanted.then(|| self.publish(topic, keep)).transpose()
+    }
+
+    /// Offers a service below the name of the node, by its package and type.
+    pub fn serve<Q: Message + Clone + 'static, A: Message + 'static>(
+        &mut self,
+        service: &str,
+        [package, of]: [&str; 2],
+    ) -> Result<Server<Q, A>, RunError> {
+        let name = name(&self.below(service))?;
+        let (of, qos) = (
+            ServiceTypeName::new(package, of),
+            Keep::Last(REQUESTS).qos(),
+        );
+        let enhanced = ServiceMapping::Enhanced;
+        let server = self
+            .node
+            .create_server(enhanced, &name, &of, qos.clone(), qos);
+        server.map_err(|error| {
+            RunError::Input(format!(
+                "cannot offer the service {service} of ROS 2: {error}"
+            ))
+        })
+    }
+
+    /// Returns a name below the name of the node, such as `/gyre/get_state`.
+    pub fn below(&self, name: &str) -> String {
+        format!("{}/{name}", self.node.fully_qualified_name())
     }
 
     /// Subscribes to a topic with room for so many messages that are not yet taken: reliably, or

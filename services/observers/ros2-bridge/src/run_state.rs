@@ -2,7 +2,6 @@
 
 use std::{
     ops::Range,
-    path::PathBuf,
     sync::{
         Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
@@ -13,14 +12,16 @@ use std::{
 use gyre_client::{clock, observer::Sequence};
 use gyre_contract::Item;
 use gyre_geometry::Pose;
-use gyre_ros2_messages::Vehicle;
+
+use crate::{Settings, lifecycle::Lifecycle, motions::Motions};
 
 /// The longest wait between two looks at the run.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 pub struct Shared {
-    pub out: PathBuf,
-    pub vehicle: Vehicle,
+    pub settings: Settings,
+    /// `None` if the node is not managed: then it is active.
+    pub lifecycle: Option<Lifecycle>,
     stopping: AtomicBool,
     state: Mutex<RunState>,
 }
@@ -34,6 +35,13 @@ pub struct RunState {
     pub poses: Counts,
     /// The scans whose objects are published, in a run that tracks them.
     pub objects: Counts,
+    /// The scans whose velocity Doppler has measured.
+    pub doppler: Counts,
+    /// The keyframes that were found in the map of an earlier drive.
+    pub fixes: Counts,
+    pub motions: Motions,
+    /// Poses that were sent before a reader of odometry was found, or after it left.
+    pub unread: u64,
     /// Messages for which readers left no room.
     pub unsent: u64,
     pub maps: u64,
@@ -46,19 +54,30 @@ pub struct Counts {
     /// The number of the first one that was published: those before it came before the bridge.
     pub first: Option<u64>,
     pub published: u64,
+    /// Those that were not published, since the node was not active.
+    pub held_back: u64,
+    /// Those that contained nothing to publish.
+    pub empty: u64,
     sequence: Sequence,
 }
 
 impl Counts {
-    /// Counts a message, and the messages missing before it. False for one that was published
-    /// before.
-    pub fn count(&mut self, item: &Item) -> bool {
+    /// Counts a message, and the messages missing before it; returns whether to publish it. False
+    /// for one that was published before, or while the node is not active.
+    pub fn count(&mut self, item: &Item, is_active: bool) -> bool {
         let is_new = self.sequence.advance(item).is_some();
-        if is_new {
+        self.held_back += u64::from(is_new && !is_active);
+        if is_new && is_active {
             self.first.get_or_insert(item.seq);
             self.published += 1;
         }
-        is_new
+        is_new && is_active
+    }
+
+    /// Corrects the count of a message that contains nothing to publish.
+    pub fn was_empty(&mut self) {
+        self.published -= 1;
+        self.empty += 1;
     }
 
     pub fn missed(&self) -> u64 {
@@ -84,7 +103,8 @@ impl RunState {
 
     /// Returns the number of messages that were not published or not sent.
     pub fn lost(&self) -> u64 {
-        self.poses.missed() + self.objects.missed() + self.unsent
+        let counts = [&self.poses, &self.objects, &self.doppler, &self.fixes];
+        counts.map(Counts::missed).iter().sum::<u64>() + self.unsent
     }
 }
 
@@ -98,10 +118,10 @@ pub enum RunPhase {
 }
 
 impl Shared {
-    pub fn new(out: PathBuf, vehicle: Vehicle) -> Self {
+    pub fn new(settings: Settings, lifecycle: Option<Lifecycle>) -> Self {
         Self {
-            out,
-            vehicle,
+            settings,
+            lifecycle,
             stopping: AtomicBool::new(false),
             state: Mutex::default(),
         }
@@ -109,6 +129,11 @@ impl Shared {
 
     pub fn state(&self) -> MutexGuard<'_, RunState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns whether messages are published.
+    pub fn is_active(&self) -> bool {
+        self.lifecycle.as_ref().is_none_or(Lifecycle::is_active)
     }
 
     pub fn begin(&self, slam: bool) {

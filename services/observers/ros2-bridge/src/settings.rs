@@ -9,16 +9,35 @@ use gyre_slam::{EstimatorKind, mapping::MapOptions};
 pub struct Settings {
     pub out: PathBuf,
     pub domain: Domain,
-    /// The namespace of `odom`, `map` and the objects, such as `/` or `/robot`.
+    /// The namespace of the node and of its own topics, such as `/` or `/robot`.
     pub namespace: String,
+    /// The name of the node.
+    pub name: String,
     pub vehicle: Vehicle,
     /// True to publish `odom` -> `base_link` and `map` -> `odom`: only one program may.
     pub transforms: bool,
-    /// The settings of the map of a run with SLAM; `None`: no map.
-    pub map: Option<MapSettingsOf>,
+    /// Time by which the transform `map` -> `odom` is dated ahead, ns.
+    pub ahead_ns: i64,
+    pub map: bool,
+    /// True to publish the time of a replay.
+    pub clock: bool,
+    /// True for a managed node, which publishes only while it is active.
+    pub is_managed: bool,
+    /// Reads the settings of the run in a folder.
+    pub of_run: fn(&Path) -> Result<RunSettings, String>,
 }
 
-pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
+/// The settings of a run that the bridge needs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSettings {
+    /// `None` without SLAM.
+    pub map: Option<MapSettings>,
+    pub has_doppler: bool,
+    /// True if the run plays a recording or a simulation, not a radar.
+    pub is_replay: bool,
+    /// The topics of ROS 2 from which it receives other sensors.
+    pub sensor_topics: Vec<String>,
+}
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSettings {

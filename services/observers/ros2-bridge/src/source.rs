@@ -5,7 +5,6 @@ mod ask;
 mod configuration_estimate;
 mod driver;
 mod radar;
-mod wakeups;
 
 use std::time::Duration;
 

@@ -29,3 +29,23 @@ package! { diagnostic_msgs:
         status: Vec<DiagnosticStatus> = "DiagnosticStatus[] status",
     }
 }
+
+impl KeyValue {
+    pub fn new(key: &str, value: impl ToString) -> Self {
+        Self {
+            key: key.to_owned(),
+            value: value.to_string(),
+        }
+    }
+}
+
+impl DiagnosticStatus {
+    pub fn new(name: &str, level: u8, message: String) -> Self {
+        Self {
+            level,
+            name: name.to_owned(),
+            message,
+            ..Self::default()
+        }
+    }
+}

@@ -6,13 +6,16 @@
 
 use std::str::FromStr;
 
-use gyre_contract::{PoseHeader, flag, outcome};
-use gyre_geometry::{Pose, Twist, UncertainMotion, pose as planar, xy_yaw};
+use gyre_contract::{FixHeader, PoseHeader, flag, outcome};
+use gyre_geometry::{Pose, Twist, UncertainMotion, pose as planar, samples::Evidence, xy_yaw};
 use nalgebra::{Matrix3, Rotation2, Vector2};
 
 use crate::{
     builtin_interfaces::Time,
-    geometry_msgs::{self, Covariance, Point, Quaternion, Transform, TransformStamped, Vector3},
+    geometry_msgs::{
+        self, Covariance, Point, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion,
+        Transform, TransformStamped, TwistWithCovarianceStamped, Vector3,
+    },
     nav_msgs::{MapMetaData, OccupancyGrid, Odometry},
     std_msgs::Header,
     tf2_msgs::TFMessage,
@@ -22,6 +25,9 @@ use crate::{
 /// velocities. So large that no filter uses it; zero would mean that they are known exactly. ROS
 /// 2's `diff_drive_controller` uses the same value.
 pub const UNKNOWN: f64 = 1e6;
+
+/// The frame of the map of an earlier drive: its first keyframe.
+const SAVED_MAP: &str = "saved_map";
 
 /// Where x, y and yaw are among x, y, z, roll, pitch and yaw.
 const PLANAR: [usize; 3] = [0, 1, 5];
@@ -140,12 +146,13 @@ impl Vehicle {
     }
 
     /// Returns a pose of the radar as the transform of odometry, and with SLAM the correction by
-    /// loops as the transform of the map.
+    /// loops as the transform of the map, which is dated ahead.
     pub fn transforms(
         &self,
         stamp_ns: i64,
         pose: &PoseHeader,
         map_from_odometry: Option<&Pose>,
+        ahead_ns: i64,
     ) -> TFMessage {
         let Frames {
             map, odom, base, ..
@@ -154,9 +161,36 @@ impl Vehicle {
         let mut transforms = vec![transform(stamp_ns, odom, base, &vehicle)];
         transforms.extend(map_from_odometry.map(|correction| {
             let correction = self.mounting.of_vehicle(correction);
-            transform(stamp_ns, map, odom, &correction)
+            transform(stamp_ns.saturating_add(ahead_ns), map, odom, &correction)
         }));
         TFMessage { transforms }
+    }
+
+    /// Returns the pose of a keyframe in the map of an earlier drive; `None` unless it was
+    /// measured.
+    pub fn fix(&self, stamp_ns: i64, fix: &FixHeader) -> Option<PoseWithCovarianceStamped> {
+        let fix = self.mounting.of_vehicle_uncertain(&fix.measured()?);
+        Some(PoseWithCovarianceStamped {
+            header: Header::new(stamp_ns, SAVED_MAP),
+            pose: PoseWithCovariance {
+                pose: pose(&fix.motion),
+                covariance: covariance(Some(&fix.covariance)),
+            },
+        })
+    }
+
+    /// Returns the velocity of the radar, ahead and to the left, that Doppler has measured.
+    pub fn doppler(&self, stamp_ns: i64, velocity: &Evidence) -> TwistWithCovarianceStamped {
+        let [xx, xy, yy] = velocity.covariance;
+        let known = Matrix3::new(xx, xy, 0.0, xy, yy, 0.0, 0.0, 0.0, UNKNOWN);
+        let mut message = TwistWithCovarianceStamped {
+            header: Header::new(stamp_ns, &self.frames.radar),
+            ..TwistWithCovarianceStamped::default()
+        };
+        message.twist.covariance = covariance(Some(&known));
+        let linear = &mut message.twist.twist.linear;
+        [linear.x, linear.y] = velocity.value;
+        message
     }
 }
 

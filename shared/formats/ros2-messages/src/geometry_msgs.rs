@@ -95,6 +95,11 @@ package! { geometry_msgs:
         covariance: Covariance = "float64[36] covariance",
     }
 
+    struct PoseWithCovarianceStamped {
+        header: Header = "std_msgs/Header header",
+        pose: PoseWithCovariance = "PoseWithCovariance pose",
+    }
+
     /// Linear, m/s, and angular, rad/s.
     #[derive(Copy)]
     struct Twist {
@@ -112,6 +117,11 @@ package! { geometry_msgs:
     struct TwistWithCovariance {
         twist: Twist = "Twist twist",
         covariance: Covariance = "float64[36] covariance",
+    }
+
+    struct TwistWithCovarianceStamped {
+        header: Header = "std_msgs/Header header",
+        twist: TwistWithCovariance = "TwistWithCovariance twist",
     }
 
     #[derive(Copy)]

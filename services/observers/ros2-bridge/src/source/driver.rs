@@ -14,8 +14,8 @@ use gyre_ros2_messages::{
 };
 use ros2_client::{Gid, ReadError, Subscription};
 
-use super::{Settings, wakeups::Wakeups};
-use crate::node::Node;
+use super::Settings;
+use crate::{node::Node, wakeups::Wakeups};
 
 const NODE: &str = "gyre_source";
 /// Azimuths that are kept until they are taken: ten turns. The driver keeps one turn.
@@ -109,12 +109,11 @@ impl Driver {
         for (kind, topic) in &settings.sensors {
             if *kind == SampleKind::Gnss {
                 fixes = Some(wakeups.subscribe(&mut node, topic, FIXES, true)?);
+                continue;
             }
             let sampled = SAMPLED.iter().find(|(of, _)| of == kind);
-            if let Some((_, subscribe)) = sampled {
-                let take = subscribe(&mut node, &mut sample_wakeups, topic)?;
-                samples.push((*kind, take));
-            }
+            let (_, subscribe) = sampled.ok_or_else(|| unknown(*kind))?;
+            samples.push((*kind, subscribe(&mut node, &mut sample_wakeups, topic)?));
         }
         Ok(Self {
             topic: settings.topic.clone(),
@@ -206,6 +205,13 @@ impl Driver {
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
         self.azimuths.as_ref().map_or(Ok(None), |take| take())
     }
+}
+
+fn unknown(kind: SampleKind) -> RunError {
+    let section = kind.section();
+    RunError::Input(format!(
+        "{section}.kind is ros2, but no message of ROS 2 has samples of this kind: use udp, or a log"
+    ))
 }
 
 /// The sample of an unreadable message, or one without rates, is not a number, so that it is

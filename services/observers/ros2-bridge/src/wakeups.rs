@@ -10,7 +10,7 @@ use gyre_client::RunError;
 use gyre_ros2_messages::Ros2Message;
 use ros2_client::{
     Subscription,
-    dds::rustdds::mio1::{Events, Interest, Poll, Token},
+    dds::rustdds::mio1::{Events, Interest, Poll, Token, event::Source},
 };
 
 use crate::node::Node;
@@ -40,11 +40,16 @@ impl Wakeups {
         is_lossy: bool,
     ) -> Result<Subscription<M>, RunError> {
         let mut topic: Subscription<M> = node.subscribe(topic, depth, is_lossy)?;
-        // All topics are read after an event of one.
-        let registry = self.poll.registry();
-        let registered = registry.register(&mut topic, Token(0), Interest::READABLE);
-        registered.map_err(failed)?;
+        self.add(&mut topic)?;
         Ok(topic)
+    }
+
+    /// Makes the descriptor readable when this topic or service has something to take.
+    pub fn add(&mut self, source: &mut impl Source) -> Result<(), RunError> {
+        // All are read after an event of one.
+        let registry = self.poll.registry();
+        let registered = registry.register(source, Token(0), Interest::READABLE);
+        registered.map_err(failed)
     }
 
     pub fn descriptor(&self) -> BorrowedFd<'_> {

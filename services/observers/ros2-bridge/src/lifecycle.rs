@@ -1,0 +1,128 @@
+//! The states of a managed node, which publishes while it is active.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use gyre_client::clock;
+use gyre_ros2_messages::lifecycle_msgs::{
+    State, Transition, TransitionDescription, TransitionEvent,
+};
+
+use crate::outlet::Outlet;
+
+const UNCONFIGURED: u8 = 1;
+const INACTIVE: u8 = 2;
+const ACTIVE: u8 = 3;
+const FINALIZED: u8 = 4;
+
+const STATES: [(u8, &str); 4] = [
+    (UNCONFIGURED, "unconfigured"),
+    (INACTIVE, "inactive"),
+    (ACTIVE, "active"),
+    (FINALIZED, "finalized"),
+];
+
+/// Each transition: number, name, and the states before and after it.
+const TRANSITIONS: [(u8, &str, u8, u8); 7] = [
+    (1, "configure", UNCONFIGURED, INACTIVE),
+    (2, "cleanup", INACTIVE, UNCONFIGURED),
+    (3, "activate", INACTIVE, ACTIVE),
+    (4, "deactivate", ACTIVE, INACTIVE),
+    (5, "shutdown", UNCONFIGURED, FINALIZED),
+    (6, "shutdown", INACTIVE, FINALIZED),
+    (7, "shutdown", ACTIVE, FINALIZED),
+];
+
+/// The state of a managed node.
+pub struct Lifecycle {
+    current: Mutex<(u8, Outlet<TransitionEvent>)>,
+}
+
+impl Lifecycle {
+    pub fn new(events: Outlet<TransitionEvent>) -> Self {
+        Self {
+            current: Mutex::new((UNCONFIGURED, events)),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, (u8, Outlet<TransitionEvent>)> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub fn is_active(&self) -> bool {
+        self.lock().0 == ACTIVE
+    }
+
+    pub fn state(&self) -> State {
+        state_of(self.lock().0)
+    }
+
+    /// Makes a transition, and publishes it; false if the state does not have it.
+    pub fn change(&self, wanted: &Transition) -> bool {
+        let mut current = self.lock();
+        let Some((id, label, from, to)) = transition(current.0, wanted) else {
+            return false;
+        };
+        current.0 = to;
+        current.1.send(TransitionEvent {
+            timestamp: clock::since_1970_ns().unsigned_abs(),
+            transition: Transition {
+                id,
+                label: label.to_owned(),
+            },
+            start_state: state_of(from),
+            goal_state: state_of(to),
+        });
+        true
+    }
+}
+
+/// Returns the transition of this name, else of this number, from a state.
+fn transition(from: u8, wanted: &Transition) -> Option<(u8, &'static str, u8, u8)> {
+    let mut from_here = TRANSITIONS.into_iter().filter(|it| it.2 == from);
+    from_here.find(|(id, label, ..)| match wanted.label.is_empty() {
+        true => *id == wanted.id,
+        false => *label == wanted.label,
+    })
+}
+
+fn state_of(id: u8) -> State {
+    let known = STATES.iter().find(|(known, _)| *known == id);
+    State {
+        id,
+        label: known.map_or("unknown", |(_, label)| label).to_owned(),
+    }
+}
+
+pub fn states() -> Vec<State> {
+    STATES.into_iter().map(|(id, _)| state_of(id)).collect()
+}
+
+pub fn transitions() -> Vec<TransitionDescription> {
+    let described = |(id, label, from, to): (u8, &str, u8, u8)| TransitionDescription {
+        transition: Transition {
+            id,
+            label: label.to_owned(),
+        },
+        start_state: state_of(from),
+        goal_state: state_of(to),
+    };
+    TRANSITIONS.into_iter().map(described).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_has_its_transitions_by_number_or_by_name() {
+        let to = |from, id, label: &str| {
+            let label = label.to_owned();
+            transition(from, &Transition { id, label }).map(|it| it.3)
+        };
+        assert_eq!(to(UNCONFIGURED, 1, ""), Some(INACTIVE));
+        assert_eq!(to(UNCONFIGURED, 3, ""), None);
+        assert_eq!(to(INACTIVE, 0, "activate"), Some(ACTIVE));
+        assert_eq!(to(ACTIVE, 0, "shutdown"), Some(FINALIZED));
+        assert_eq!(to(FINALIZED, 1, ""), None);
+    }
+}

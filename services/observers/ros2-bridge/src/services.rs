@@ -1,0 +1,123 @@
+//! The services of the bridge: each with its name, its type and its answer. Its topics are in
+//! [`topics`](crate::topics).
+
+use gyre_client::{RunError, wait_for_readable};
+use ros2_client::Message;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use crate::{
+    lifecycle::{self, Lifecycle},
+    node::Node,
+    run_state::{POLL_INTERVAL, Shared},
+    wakeups::Wakeups,
+};
+
+/// A request or an answer: the library has a trait of its own for them.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Wire<T>(pub T);
+
+impl<T: Serialize + DeserializeOwned> Message for Wire<T> {}
+
+/// A request without content: it has a byte.
+#[derive(Clone, Serialize, Deserialize)]
+struct Empty(u8);
+
+/// Answers all requests to a service that have arrived.
+type Serve = Box<dyn Fn(&Shared) + Send>;
+
+pub struct Services {
+    wakeups: Wakeups,
+    served: Vec<Serve>,
+}
+
+impl Services {
+    /// Opens the services; those of its states only for a managed node.
+    pub fn open(node: &mut Node, is_managed: bool) -> Result<Self, RunError> {
+        let mut services = Self {
+            wakeups: Wakeups::new()?,
+            served: Vec::new(),
+        };
+        if is_managed {
+            services.add_lifecycle(node)?;
+        }
+        Ok(services)
+    }
+
+    fn add_lifecycle(&mut self, node: &mut Node) -> Result<(), RunError> {
+        let of = |name| ["lifecycle_msgs", name];
+        self.add(node, "change_state", of("ChangeState"), |shared, wanted| {
+            let lifecycle = shared.lifecycle.as_ref();
+            lifecycle.is_some_and(|it| it.change(&wanted))
+        })?;
+        self.add(node, "get_state", of("GetState"), |shared, Empty(_)| {
+            shared
+                .lifecycle
+                .as_ref()
+                .map(Lifecycle::state)
+                .unwrap_or_default()
+        })?;
+        let states = of("GetAvailableStates");
+        self.add(node, "get_available_states", states, |_, Empty(_)| {
+            lifecycle::states()
+        })?;
+        let transitions = of("GetAvailableTransitions");
+        self.add(
+            node,
+            "get_available_transitions",
+            transitions,
+            |shared, Empty(_)| {
+                let state = shared.lifecycle.as_ref().map(Lifecycle::state);
+                let mut available = lifecycle::transitions();
+                available.retain(|it| Some(&it.start_state) == state.as_ref());
+                available
+            },
+        )?;
+        self.add(node, "get_transition_graph", transitions, |_, Empty(_)| {
+            lifecycle::transitions()
+        })
+    }
+
+    /// Adds a service below the name of the node, such as `/gyre/get_state`, by its package and
+    /// type.
+    fn add<Q, A>(
+        &mut self,
+        node: &mut Node,
+        name: &str,
+        of: [&str; 2],
+        answer: fn(&Shared, Q) -> A,
+    ) -> Result<(), RunError>
+    where
+        Q: Serialize + DeserializeOwned + Clone + Send + 'static,
+        A: Serialize + DeserializeOwned + Send + 'static,
+    {
+        let mut server = node.serve::<Wire<Q>, Wire<A>>(name, of)?;
+        self.wakeups.add(&mut server)?;
+        let name = name.to_owned();
+        self.served.push(Box::new(move |shared| {
+            loop {
+                let answered = match server.receive_request() {
+                    Ok(None) => break,
+                    Ok(Some((id, Wire(request)))) => server
+                        .send_response(id, Wire(answer(shared, request)))
+                        .map_err(|error| format!("{error:?}")),
+                    Err(error) => Err(format!("{error:?}")),
+                };
+                if let Err(error) = answered {
+                    tracing::warn!("a request to {name} has no answer: {error}");
+                }
+            }
+        }));
+        Ok(())
+    }
+
+    /// Answers requests until the bridge stops.
+    pub fn run(mut self, shared: &Shared) -> Result<(), RunError> {
+        while !shared.is_stopping() && !self.served.is_empty() {
+            wait_for_readable(&self.wakeups.descriptor(), POLL_INTERVAL)?;
+            self.wakeups.clear()?;
+            self.served.iter().for_each(|serve| serve(shared));
+        }
+        Ok(())
+    }
+}
