@@ -79,6 +79,8 @@ pub enum Command {
     Swap(SwapArguments),
     /// Begin a new chain of motions at a pose, in a running run.
     Reset(ResetArguments),
+    /// Begin a new map of SLAM, in a running run.
+    NewMap(RunChoice),
     /// Give a running run the pose of the vehicle in the map in which it localises.
     Locate(LocateArguments),
     /// Run a second program beside a stage of a running run, and compare what both make of the same

@@ -49,6 +49,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Logs(arguments) => gyre_tools::operate::logs(&arguments),
         Command::Top(arguments) => gyre_tools::operate::top(&arguments),
         Command::Restart(arguments) => gyre_tools::operate::restart(&arguments),
+        Command::NewMap(run) => gyre_tools::operate::new_map(&run),
         Command::Reset(arguments) => gyre_tools::operate::reset(&arguments),
         Command::Locate(arguments) => gyre_tools::operate::locate(&arguments),
         Command::Echo(arguments) => gyre_tools::operate::echo(&arguments),

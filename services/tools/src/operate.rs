@@ -1,5 +1,5 @@
 //! The commands that operate running runs: `gyre up`, `down`, `ps`, `logs`, `top`, `restart`,
-//! `swap`, `reset`, `locate` and `echo`.
+//! `swap`, `reset`, `new-map`, `locate` and `echo`.
 //!
 //! Each asks the supervisor of a run at its control socket ([`gyre_client::control`]); nothing of a
 //! run is looked up elsewhere, but its logs.
@@ -21,7 +21,7 @@ use gyre_configuration::terminal::{Failure, print};
 
 pub(crate) use background::status_of;
 pub use background::{detach_if_asked, down, is_in_background, up};
-pub use commands::{LocateArguments, ResetArguments, locate, reset};
+pub use commands::{LocateArguments, ResetArguments, locate, new_map, reset};
 pub use echo::{EchoArguments, echo};
 pub use logs::{LogsArguments, logs};
 pub use processes::{PsArguments, ps};

@@ -28,6 +28,8 @@ pub enum Command {
     /// Begin a new chain of motions at a pose of the odometry. With `keep_map` SLAM continues its
     /// map: the pose is a measurement of its deviations. Without it SLAM begins a new map there.
     Reset { at: GivenPose, keep_map: bool },
+    /// Begin a new map of SLAM with the next scan; the chain of motions continues.
+    NewMap {},
     /// The pose of the vehicle in the map in which the run localises.
     Locate { at: GivenPose },
 }
@@ -78,16 +80,27 @@ impl GivenPose {
 }
 
 impl Command {
-    pub fn given(&self) -> &GivenPose {
-        match self {
-            Self::Reset { at, .. } | Self::Locate { at } => at,
-        }
+    /// Returns whether a chain of motions starts with the next scan.
+    pub fn starts_chain(&self) -> bool {
+        matches!(self, Self::Reset { .. })
+    }
+
+    /// Returns whether SLAM drops its map.
+    pub fn starts_map(&self) -> bool {
+        matches!(
+            self,
+            Self::Reset {
+                keep_map: false,
+                ..
+            } | Self::NewMap {}
+        )
     }
 
     pub fn check(&self) -> Result<(), String> {
-        match self.given().is_valid() {
-            true => Ok(()),
-            false => Err(format!(
+        match self {
+            Self::NewMap {} => Ok(()),
+            Self::Reset { at, .. } | Self::Locate { at } if at.is_valid() => Ok(()),
+            _ => Err(format!(
                 "a given pose has finite numbers within {REACH_M} m and deviations above 0"
             )),
         }

@@ -63,6 +63,8 @@ gyre swap masking --command ./my-masking
 gyre swap masking out/radar
 gyre reset
 gyre reset out/radar --pose 12,-3,90 --keep-map
+gyre new-map
+gyre new-map out/radar
 gyre locate out/radar --pose 12,-3,90
 gyre shadow masking --command ./my-masking --scans 200
 gyre shadow refinement out/radar

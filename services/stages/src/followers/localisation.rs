@@ -77,7 +77,7 @@ impl Fixes {
         let new = self.commands.of_scan(stamp_ns).map_err(RunError::input)?;
         let places = new.filter_map(|command| match command {
             Command::Locate { at } => Some(at.pose()),
-            Command::Reset { .. } => None,
+            Command::Reset { .. } | Command::NewMap {} => None,
         });
         Ok(places.last())
     }

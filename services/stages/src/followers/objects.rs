@@ -68,8 +68,7 @@ impl Tracking {
     fn track_next(&mut self) -> Result<Option<ObjectsHeader>, RunError> {
         let scan = self.scans.read(self.read)?;
         let new = self.commands.of_scan(scan.stamp_ns);
-        let is_reset = |command: &Command| matches!(command, Command::Reset { .. });
-        if new.map_err(RunError::input)?.any(is_reset) {
+        if new.map_err(RunError::input)?.any(Command::starts_chain) {
             self.tracker.end_tracks();
         }
         let placed = PlacedScan {

@@ -40,7 +40,7 @@ impl AppliedCommands {
             ..*item
         };
         let mut new = self.commands.between(before, apply);
-        if new.any(|command| matches!(command, Command::Reset { .. })) {
+        if new.any(Command::starts_chain) {
             marked.flags |= flag::BREAK;
             marked.previous_scan = marked.scan;
         }

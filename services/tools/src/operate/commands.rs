@@ -1,4 +1,4 @@
-//! `gyre reset` and `gyre locate`: commands that change the poses of a running run.
+//! `gyre reset`, `gyre new-map` and `gyre locate`: commands that change the poses of a running run.
 
 use std::time::Duration;
 
@@ -57,6 +57,12 @@ pub fn reset(arguments: &ResetArguments) -> Result<(), Failure> {
     }
     let from_ns = run.command(Command::Reset { at, keep_map })?;
     applied("is reset", from_ns)
+}
+
+/// Begins a new map of SLAM.
+pub fn new_map(choice: &RunChoice) -> Result<(), Failure> {
+    let from_ns = chosen_to_change(choice)?.command(Command::NewMap {})?;
+    applied("has a new map", from_ns)
 }
 
 /// Gives a run the pose of the vehicle in the map in which it localises.

@@ -63,7 +63,7 @@ impl PoseLog for Keyframes {
 
     /// A command makes the next pose a keyframe. A reset without its map begins the log again.
     fn obey(&mut self, command: &Command) -> Result<(), LogError> {
-        if is_new_map(command) {
+        if command.starts_map() {
             self.log.cut(0)?;
         }
         obey(&mut self.builder, command);
@@ -104,20 +104,10 @@ fn newest(
     Ok((0, None))
 }
 
-fn is_new_map(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::Reset {
-            keep_map: false,
-            ..
-        }
-    )
-}
-
 fn obey(builder: &mut KeyframeBuilder, command: &Command) {
     match command {
         Command::Reset { at, keep_map: true } => builder.give_next(at.pose().covariance),
-        Command::Reset { .. } => *builder = KeyframeBuilder::default(),
+        Command::Reset { .. } | Command::NewMap {} => *builder = KeyframeBuilder::default(),
         Command::Locate { .. } => builder.require_next(),
     }
 }
@@ -133,7 +123,7 @@ fn recover(
     // Without keyframes, a command may have cut them off: none of the poses before it has one.
     let of_map = match newest {
         Some(_) => 0,
-        None => commands.last(is_new_map),
+        None => commands.last(Command::starts_map),
     };
     let mut builder = KeyframeBuilder::default();
     let mut before = of_map;

@@ -81,12 +81,15 @@ impl Supervisor<'_> {
     /// Keeps a command for masking, which applies it to the next scan, and returns its number.
     fn number(&self, command: Command) -> Result<u64, String> {
         let manifest = &self.run.plan.manifest;
+        let (slam, localises) = (manifest.window.slam, manifest.window.localises);
         let missing = match command {
-            Command::Reset { keep_map: true, .. } => (!manifest.window.slam)
-                .then_some("the run has no map to keep: that needs slam.kind"),
-            Command::Locate { .. } => (!manifest.window.localises)
-                .then_some("the run localises in no map: that needs slam.map, with slam.kind"),
-            Command::Reset { .. } => None,
+            Command::Reset { keep_map: true, .. } | Command::NewMap {} if !slam => {
+                Some("the run has no map: that needs slam.kind")
+            }
+            Command::Locate { .. } if !localises => {
+                Some("the run localises in no map: that needs slam.map, with slam.kind")
+            }
+            _ => None,
         };
         if let Some(missing) = missing {
             return Err(missing.to_owned());
