@@ -108,7 +108,10 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
     let _driver = Driver::playing(whole.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
     let run = run.sets("gyro.kind=ros2 gyro.max_wait_ms=200 wheels.kind=ros2");
+    // Its odometry would be its wheels.
+    let mut bridge = Program::bridge(&run, &domain, &[]);
     let live = run.complete();
+    bridge.await_words("is not published: it receives its wheels from /odom");
     let used = ["gyro", "wheels"].map(|of| run.count(&format!("{of}/motions")) as usize);
     assert!(used.iter().all(|used| *used > SCANS / 2));
     if used == [SCANS - 1; 2] {

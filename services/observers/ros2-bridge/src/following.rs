@@ -49,6 +49,17 @@ pub fn follow_runs(shared: &Shared, mut topics: RunTopics, say: fn(&str)) {
     }
 }
 
+/// Follows a topic of a run to its end.
+type Follow<'a> = Box<dyn FnMut(&Run) -> Result<(), RunError> + Send + 'a>;
+
+/// Calls `take` with the header of each message of a topic.
+fn each<'a, M: Message>(
+    shared: &'a Shared,
+    mut take: impl FnMut(&M::Header) + Send + 'a,
+) -> Follow<'a> {
+    Box::new(move |run| each_message::<M>(shared, run, &mut take))
+}
+
 /// Returns a sentence if the run would receive its own odometry as the speed of its wheels.
 fn own_topic(settings: &Result<RunSettings, String>, topics: &PoseTopics) -> Option<String> {
     let mut received = settings.iter().flat_map(|it| &it.sensor_topics);
@@ -77,62 +88,48 @@ fn follow_run(
     } = topics;
     poses.has_clock = is(|it| it.is_replay);
     if poses.clock.is_some() && !poses.has_clock {
-        say("/clock is not published: the run does not play a recording");
+        let unread = settings.as_ref().err().map(String::as_str);
+        let reason = unread.unwrap_or("the run does not play a recording");
+        say(&format!("/clock is not published: {reason}"));
     }
     let has_doppler = is(|it| it.has_doppler);
+    let mut followed: Vec<Follow<'_>> = vec![Box::new(|run| follow_poses(shared, run, poses, say))];
+    if window.objects {
+        followed.push(each::<Objects>(shared, |it| {
+            objects.publish(shared, it, say)
+        }));
+    }
+    if has_doppler {
+        followed.push(each::<Masked>(shared, |it| {
+            publish_doppler(doppler, shared, it, say)
+        }));
+    }
+    if window.localises {
+        followed.push(each::<Fix>(shared, |it| {
+            publish_fix(fixes, shared, it, say)
+        }));
+    }
+    if window.slam {
+        followed.push(each::<Correction>(shared, |it| {
+            shared.state().map_from_odometry = Some(it.map_from_odometry());
+        }));
+    }
+    if let Some(maps) = map.as_mut().filter(|_| window.slam) {
+        followed.push(Box::new(|run| {
+            live_map::follow(shared, run, settings, maps);
+            Ok(())
+        }));
+    }
     thread::scope(|threads| {
-        let follow_topic = |follow: &mut dyn FnMut(&Run) -> Result<(), RunError>| {
-            until_end(shared, name, follow);
-        };
-        threads.spawn(move || follow_topic(&mut |run| follow_poses(shared, run, poses, say)));
-        if window.objects {
-            threads.spawn(move || {
-                follow_topic(&mut |run| {
-                    each_message::<Objects>(shared, run, |header| {
-                        objects.publish(shared, header, say);
-                    })
-                });
-            });
-        }
-        if has_doppler {
-            threads.spawn(move || {
-                follow_topic(&mut |run| {
-                    each_message::<Masked>(shared, run, |scan| {
-                        publish_doppler(doppler, shared, scan, say);
-                    })
-                });
-            });
-        }
-        if window.localises {
-            threads.spawn(move || {
-                follow_topic(&mut |run| {
-                    each_message::<Fix>(shared, run, |fix| publish_fix(fixes, shared, fix, say))
-                });
-            });
-        }
-        if window.slam {
-            threads.spawn(move || {
-                follow_topic(&mut |run| {
-                    each_message::<Correction>(shared, run, |correction| {
-                        shared.state().map_from_odometry = Some(correction.map_from_odometry());
-                    })
-                });
-            });
-            if let Some(maps) = map {
-                threads.spawn(move || {
-                    follow_topic(&mut |run| {
-                        live_map::follow(shared, run, settings, maps);
-                        Ok(())
-                    });
-                });
-            }
+        for follow in followed {
+            threads.spawn(move || until_end(shared, name, follow));
         }
     });
 }
 
 /// Calls `follow` with the run of this name, again after a failure, and waits for the end of the
 /// run: until the results are written.
-fn until_end(shared: &Shared, name: &str, follow: &mut dyn FnMut(&Run) -> Result<(), RunError>) {
+fn until_end(shared: &Shared, name: &str, mut follow: Follow<'_>) {
     while !shared.is_stopping() {
         let followed = match Run::open(&shared.settings.out) {
             Ok(run) if run.manifest().prefix != name => return,

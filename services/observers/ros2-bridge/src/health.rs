@@ -50,7 +50,9 @@ fn array(state: &RunState, status: Option<Status>, before: &mut LastCounts) -> D
     let mut array = DiagnosticArray::default();
     array.header.stamp = Time::from_ns(clock::since_1970_ns());
     array.status.push(run(state, status.as_ref(), before));
-    array.status.extend(state.motions.diagnostic());
+    let is_running = matches!(state.phase, RunPhase::Working | RunPhase::Finishing);
+    let of_motions = state.motions.diagnostic().filter(|_| is_running);
+    array.status.extend(of_motions);
     let processes = status.iter().flat_map(|status| &status.processes);
     array.status.extend(processes.map(process));
     array
