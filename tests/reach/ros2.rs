@@ -284,6 +284,36 @@ fn stamps(messages: &[Value]) -> Vec<i64> {
 }
 
 #[test]
+fn a_node_of_ros_gives_a_running_run_a_pose_a_new_map_and_a_reset() {
+    only_if!(has_ros());
+    let run = Run::of_recording().set("slam.kind=graph").rate("0.7");
+    let domain = domain(19);
+    let mut bridge = Program::bridge(&run, &domain, &[]);
+    let mut node = Program::node(&domain, &["/"]);
+    let running = run.started(3);
+    node.write("commands");
+    running.finish().succeeded();
+    bridge.await_end();
+    let topics = received(node);
+    for service in ["new_map", "reset"] {
+        let [answer] = &topics[service][..] else {
+            panic!("{:?}", topics[service]);
+        };
+        assert_eq!(answer["success"], true, "{answer}");
+    }
+    run.assert_counts("commands=3 breaks=2");
+    let places = topics["/odom"]
+        .iter()
+        .map(|it| &it["pose"]["pose"]["position"]);
+    let places: Vec<[f64; 2]> = places
+        .map(|it| ["x", "y"].map(|axis| number(&it[axis])))
+        .collect();
+    let given = places.iter().position(|it| *it == [40.0, -30.0]);
+    let reset = places.iter().rposition(|it| *it == [0.0, 0.0]);
+    assert!(given > Some(0) && reset > given, "{places:?}");
+}
+
+#[test]
 fn a_replay_gives_the_time_to_nodes_with_simulated_time() {
     only_if!(has_ros());
     let (run, domain) = (Run::of_recording().rate("2"), domain(12));

@@ -78,6 +78,7 @@ fn run_settings(out: &Path) -> Result<RunSettings, String> {
         }),
         has_doppler: configuration.odometry.sensors.doppler.is_used(),
         is_replay: !configuration.is_radar(),
+        predicts: configuration.run.predict_hz > 0.0,
         sensor_topics: sensors_in_ros2(&configuration),
     })
 }

@@ -2,7 +2,7 @@
 
 Arguments: the namespace of the run, and `sim` for a node with `use_sim_time`. Domain and network are those of ROS_DOMAIN_ID and
 ROS_AUTOMATIC_DISCOVERY_RANGE. The first line is `{"ready": true}` once there is odometry; a line `lifecycle` of the input takes a managed node
-through its states. Odometry is also read as sensor data is, on the topic `sensor`; the topic `now` has the time of the node at each of its messages.
+through its states, a line `commands` gives the run a pose, a new map and a reset. Odometry is also read as sensor data is, on the topic `sensor`; the topic `now` has the time of the node at each of its messages.
 """
 
 import json
@@ -20,6 +20,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 namespace, is_simulated = sys.argv[1].rstrip("/"), sys.argv[2:] == ["sim"]
@@ -100,6 +101,20 @@ def take_through_states():
         ask(GetAvailableTransitions, "get_available_transitions")
 
 
+def give_commands():
+    poses = node.create_publisher(PoseWithCovarianceStamped, namespace + "/initialpose", 1)
+    while not poses.get_subscription_count():
+        spin(0.02)
+    pose = PoseWithCovarianceStamped()
+    pose.header.frame_id = "map"
+    pose.pose.pose.position.x, pose.pose.pose.position.y = 40.0, -30.0
+    pose.pose.pose.orientation.w = 1.0
+    poses.publish(pose)
+    spin(1.0)
+    ask(Trigger, "new_map")
+    ask(Trigger, "reset")
+
+
 def spin(duration_s):
     until = time.monotonic() + duration_s
     while time.monotonic() < until:
@@ -115,9 +130,10 @@ print(json.dumps({"ready": True}), *lines, sep="\n", flush=True)
 while True:
     spin(0.02)
     if select.select([sys.stdin], [], [], 0)[0]:
-        if not sys.stdin.readline():
+        line = sys.stdin.readline().strip()
+        if not line:
             break
-        take_through_states()
+        {"lifecycle": take_through_states, "commands": give_commands}[line]()
 newest = time.monotonic()
 # What is under way: a map takes a second.
 while time.monotonic() < newest + 2.0:

@@ -1,11 +1,11 @@
 //! The threads that follow a run, and the next one in the same folder after its end.
 
-use std::thread;
+use std::{thread, time::Duration};
 
 use gyre_client::{Manifest, Next, Run, RunError};
 use gyre_contract::{
     Correction, Fix, FixHeader, Item, Masked, MaskedHeader, Message, Objects, ObjectsHeader, Pose,
-    PoseHeader, Witness,
+    PoseHeader, PredictedPose, PredictedPoseHeader, Witness,
 };
 use gyre_ros2_messages::{
     builtin_interfaces::Time,
@@ -92,8 +92,10 @@ fn follow_run(
         let reason = unread.unwrap_or("the run does not play a recording");
         say(&format!("/clock is not published: {reason}"));
     }
-    let has_doppler = is(|it| it.has_doppler);
-    let mut followed: Vec<Follow<'_>> = vec![Box::new(|run| follow_poses(shared, run, poses, say))];
+    let (has_doppler, predicts) = (is(|it| it.has_doppler), is(|it| it.predicts));
+    let mut followed: Vec<Follow<'_>> = vec![Box::new(move |run| {
+        follow_poses(shared, run, poses, predicts, say)
+    })];
     if window.objects {
         followed.push(each::<Objects>(shared, |it| {
             objects.publish(shared, it, say)
@@ -156,10 +158,30 @@ fn follow_poses(
     shared: &Shared,
     run: &Run,
     topics: &mut PoseTopics,
+    predicts: bool,
     say: fn(&str),
 ) -> Result<(), RunError> {
     shared.state().notice = None;
-    each_message::<Pose>(shared, run, |pose| topics.publish(shared, pose, say))?;
+    (topics.predicted_ns, topics.last) = (None, None);
+    let mut poses = run.observe::<Pose>()?;
+    let mut predictions = match predicts {
+        true => Some(run.observe::<PredictedPose>()?),
+        false => None,
+    };
+    while !shared.is_stopping() {
+        let mut limit = POLL_INTERVAL;
+        if let Some(predictions) = &mut predictions
+            && let Next::Message(message, _) = predictions.next(POLL_INTERVAL)?
+        {
+            topics.publish_prediction(shared, message.header(), say);
+            limit = Duration::ZERO;
+        }
+        match poses.next(limit)? {
+            Next::Message(message, _) => topics.publish(shared, message.header(), say),
+            Next::Idle => {}
+            Next::Ended => break,
+        }
+    }
     shared.state().phase = RunPhase::Finishing;
     Ok(())
 }
@@ -218,16 +240,65 @@ impl PoseTopics {
             let stamp_ns = state.stamp_ns(pose.item.stamp_ns, say);
             (stamp_ns, state.map_from_odometry)
         };
-        let (vehicle, mut unsent) = (&shared.settings.vehicle, 0);
+        self.last = Some(*pose);
+        let mut unsent = 0;
         // The time comes first: what has a later stamp lies in the future of its readers.
         if let Some(topic) = self.clock.as_mut().filter(|_| self.has_clock) {
             let clock = Time::from_ns(stamp_ns);
             unsent += u64::from(!topic.send(Clock { clock }));
         }
+        shared.state().unsent += unsent;
+        // A prediction is ahead of the next scan.
+        if self
+            .predicted_ns
+            .is_none_or(|predicted_ns| predicted_ns < stamp_ns)
+        {
+            self.send(shared, pose, stamp_ns, map_from_odometry.as_ref());
+        }
+    }
+
+    /// Publishes a pose between scans in the same way, with the last velocity.
+    fn publish_prediction(
+        &mut self,
+        shared: &Shared,
+        predicted: &PredictedPoseHeader,
+        say: fn(&str),
+    ) {
+        let is_active = shared.is_active();
+        let (stamp_ns, map_from_odometry) = {
+            let mut state = shared.state();
+            if !state.predictions.count(&predicted.item, is_active) {
+                return;
+            }
+            let stamp_ns = state.stamp_ns(predicted.item.stamp_ns, say);
+            (stamp_ns, state.map_from_odometry)
+        };
+        let Some(last) = self.last else {
+            return;
+        };
+        let pose = PoseHeader {
+            x_m: predicted.x_m,
+            y_m: predicted.y_m,
+            yaw_rad: predicted.yaw_rad,
+            covariance: predicted.covariance,
+            ..last
+        };
+        self.predicted_ns = Some(stamp_ns);
+        self.send(shared, &pose, stamp_ns, map_from_odometry.as_ref());
+    }
+
+    /// Sends odometry and transforms.
+    fn send(
+        &mut self,
+        shared: &Shared,
+        pose: &PoseHeader,
+        stamp_ns: i64,
+        map_from_odometry: Option<&gyre_geometry::Pose>,
+    ) {
+        let (vehicle, mut unsent) = (&shared.settings.vehicle, 0);
         if let Some(topic) = &mut self.transforms {
             let ahead_ns = shared.settings.ahead_ns;
-            let map = map_from_odometry.as_ref();
-            let transforms = vehicle.transforms(stamp_ns, pose, map, ahead_ns);
+            let transforms = vehicle.transforms(stamp_ns, pose, map_from_odometry, ahead_ns);
             unsent += u64::from(!topic.send(transforms));
         }
         let is_unread = !self.odometry.has_reader();

@@ -4,6 +4,7 @@
 #![cfg(feature = "dds")]
 
 mod bridge;
+mod commands;
 mod following;
 mod health;
 mod lifecycle;

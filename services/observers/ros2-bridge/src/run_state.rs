@@ -33,6 +33,8 @@ pub struct RunState {
     offset_ns: Option<i64>,
     pub map_from_odometry: Option<Pose>,
     pub poses: Counts,
+    /// The poses between scans.
+    pub predictions: Counts,
     /// The scans whose objects are published, in a run that tracks them.
     pub objects: Counts,
     /// The scans whose velocity Doppler has measured.
@@ -103,7 +105,13 @@ impl RunState {
 
     /// Returns the number of messages that were not published or not sent.
     pub fn lost(&self) -> u64 {
-        let counts = [&self.poses, &self.objects, &self.doppler, &self.fixes];
+        let counts = [
+            &self.poses,
+            &self.predictions,
+            &self.objects,
+            &self.doppler,
+            &self.fixes,
+        ];
         counts.map(Counts::missed).iter().sum::<u64>() + self.unsent
     }
 }

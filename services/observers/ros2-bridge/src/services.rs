@@ -6,6 +6,7 @@ use ros2_client::Message;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
+    commands,
     lifecycle::{self, Lifecycle},
     node::Node,
     run_state::{POLL_INTERVAL, Shared},
@@ -23,7 +24,7 @@ impl<T: Serialize + DeserializeOwned> Message for Wire<T> {}
 #[derive(Clone, Serialize, Deserialize)]
 struct Empty(u8);
 
-/// Answers all requests to a service that have arrived.
+/// Answers all requests to a service, or takes all messages of a topic, that have arrived.
 type Serve = Box<dyn Fn(&Shared) + Send>;
 
 pub struct Services {
@@ -38,10 +39,28 @@ impl Services {
             wakeups: Wakeups::new()?,
             served: Vec::new(),
         };
+        services.add_commands(node)?;
         if is_managed {
             services.add_lifecycle(node)?;
         }
         Ok(services)
+    }
+
+    fn add_commands(&mut self, node: &mut Node) -> Result<(), RunError> {
+        let trigger = ["std_srvs", "Trigger"];
+        self.add(node, "reset", trigger, |shared, Empty(_)| {
+            commands::reset(shared)
+        })?;
+        self.add(node, "new_map", trigger, |shared, Empty(_)| {
+            commands::new_map(shared)
+        })?;
+        let poses = self.wakeups.subscribe(node, "initialpose", 1, false)?;
+        self.served.push(Box::new(move |shared| {
+            while let Ok(Some((message, _))) = poses.take() {
+                commands::initial_pose(shared, &message).report("initialpose");
+            }
+        }));
+        Ok(())
     }
 
     fn add_lifecycle(&mut self, node: &mut Node) -> Result<(), RunError> {
@@ -113,7 +132,7 @@ impl Services {
 
     /// Answers requests until the bridge stops.
     pub fn run(mut self, shared: &Shared) -> Result<(), RunError> {
-        while !shared.is_stopping() && !self.served.is_empty() {
+        while !shared.is_stopping() {
             wait_for_readable(&self.wakeups.descriptor(), POLL_INTERVAL)?;
             self.wakeups.clear()?;
             self.served.iter().for_each(|serve| serve(shared));

@@ -33,6 +33,8 @@ pub struct RunSettings {
     /// `None` without SLAM.
     pub map: Option<MapSettings>,
     pub has_doppler: bool,
+    /// True if the run predicts the poses between its scans.
+    pub predicts: bool,
     /// True if the run plays a recording or a simulation, not a radar.
     pub is_replay: bool,
     /// The topics of ROS 2 from which it receives other sensors.

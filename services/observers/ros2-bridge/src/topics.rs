@@ -2,6 +2,7 @@
 //! services are in [`services`](crate::services).
 
 use gyre_client::RunError;
+use gyre_contract::PoseHeader;
 use gyre_ros2_messages::{
     diagnostic_msgs::DiagnosticArray,
     geometry_msgs::{PoseWithCovarianceStamped, TwistWithCovarianceStamped},
@@ -44,6 +45,9 @@ pub struct PoseTopics {
     pub clock: Option<Outlet<Clock>>,
     /// True in a run whose times are the times of a replay.
     pub has_clock: bool,
+    /// The stamp of the newest prediction, ns, and the pose of the newest scan.
+    pub predicted_ns: Option<i64>,
+    pub last: Option<PoseHeader>,
 }
 
 pub struct ObjectTopics {
@@ -58,6 +62,8 @@ impl Topics {
             transforms: node.publish_if(settings.transforms, "/tf", KEPT)?,
             clock: node.publish_if(settings.clock, "/clock", KEPT)?,
             has_clock: false,
+            predicted_ns: None,
+            last: None,
         };
         Ok(Self {
             of_run: RunTopics {

@@ -27,7 +27,7 @@ use crate::{
 pub const UNKNOWN: f64 = 1e6;
 
 /// The frame of the map of an earlier drive: its first keyframe.
-const SAVED_MAP: &str = "saved_map";
+pub const SAVED_MAP: &str = "saved_map";
 
 /// Where x, y and yaw are among x, y, z, roll, pitch and yaw.
 const PLANAR: [usize; 3] = [0, 1, 5];
@@ -98,6 +98,12 @@ impl Mounting {
     /// `B M B^-1` with the radar's pose `B`.
     pub fn of_vehicle(&self, of_radar: &Pose) -> Pose {
         self.0 * of_radar * self.0.inverse()
+    }
+
+    /// Returns the motion of the radar from the motion of the vehicle: the inverse of
+    /// [`of_vehicle`](Self::of_vehicle).
+    fn of_radar(&self, of_vehicle: &Pose) -> Pose {
+        self.0.inverse() * of_vehicle * self.0
     }
 
     /// Returns the motion of the vehicle with its covariance: the displacement is turned by the
@@ -177,6 +183,18 @@ impl Vehicle {
                 covariance: covariance(Some(&fix.covariance)),
             },
         })
+    }
+
+    /// Returns a given pose of the vehicle as the pose of the radar, and the standard deviations of
+    /// its place, m, and of its yaw, rad; 0 where the message has none.
+    pub fn given(&self, message: &PoseWithCovarianceStamped) -> (Pose, [f64; 2]) {
+        let (place, turn) = (message.pose.pose.position, message.pose.pose.orientation);
+        let yaw_rad = 2.0 * turn.z.atan2(turn.w);
+        let pose = self.mounting.of_radar(&planar(place.x, place.y, yaw_rad));
+        let variance =
+            |k: usize| message.pose.covariance.elements()[k * (geometry_msgs::VALUES + 1)];
+        let [x, y, yaw] = PLANAR.map(variance);
+        (pose, [(0.5 * (x + y)).sqrt(), yaw.sqrt()])
     }
 
     /// Returns the velocity of the radar, ahead and to the left, that Doppler has measured.

@@ -21,4 +21,4 @@ pub mod visualization_msgs;
 
 pub use definition::{Definition, Ros2Message, decode, encode};
 pub use domain::Domain;
-pub use frames::{Mounting, Vehicle};
+pub use frames::{Mounting, SAVED_MAP, Vehicle};
