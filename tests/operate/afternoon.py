@@ -1,0 +1,153 @@
+"""An afternoon of a robot, in minutes: it boots before its radar, loses it, is reset, killed and upgraded, starts in its map, and each pose is
+accounted for at the end.
+
+    afternoon.py GYRE FOLDER
+
+prints a line for each event. FOLDER is empty. The radar is `gyre radar-server` with the demo; when it is started again its clock steps back."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+gyre, folder = sys.argv[1:]
+began = time.monotonic()
+out, config = f"{folder}/out", f"{folder}/robot.toml"
+with socket.socket() as free:
+    free.bind(("127.0.0.1", 0))
+    address = "127.0.0.1:%d" % free.getsockname()[1]
+with open(config, "w") as file:
+    file.write(f"""[run]
+mode = "live"
+rate = "realtime"
+[source]
+kind = "colossus"
+address = "{address}"
+[raster]
+n = 127
+cell_m = 1.6
+[slam]
+kind = "graph"
+""")
+
+
+def report(event, **figures):
+    shown = "".join(f"  {name} {value}" for name, value in figures.items())
+    print(f"{time.monotonic() - began:6.1f} s  {event}{shown}", flush=True)
+
+
+def call(*words, code=0, program=None):
+    ended = subprocess.run([program or gyre, *words], capture_output=True, text=True, cwd=folder)
+    assert ended.returncode == code, (words, ended.returncode, ended.stdout, ended.stderr)
+    return ended.stdout + ended.stderr
+
+
+def up(program=None, *settings):
+    """As the unit starts it: in its own session."""
+    said = call("up", config, "--out", out, *settings, program=program)
+    return said.strip().splitlines()[-1].replace(folder, "")
+
+
+def status():
+    [run] = json.loads(call("ps", out, "--json"))
+    return run
+
+
+def until(what, look, limit_s=60):
+    since = time.monotonic()
+    while time.monotonic() < since + limit_s:
+        if look():
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"waited for {what}: {json.dumps(status())}")
+
+
+def await_poses(more):
+    poses = status()["poses"] + more
+    until(f"{poses} poses", lambda: status()["poses"] >= poses)
+
+
+radar = None
+
+
+def radar_on():
+    global radar
+    radar = subprocess.Popen([gyre, "radar-server", "demo", "--listen", address, "--repeat", "--rate", "2"], stderr=subprocess.DEVNULL)
+
+
+def radar_off():
+    radar.terminate()
+    radar.wait()
+
+
+def finished(place):
+    """The counts of a run that has ended: each scan is a pose, or counted as missing."""
+    with open(f"{place}/summary.json") as file:
+        summary = json.load(file)
+    with open(f"{place}/trajectory.tum") as file:
+        lines = len(file.read().splitlines())
+    counts = {name: summary.get(name, 0) for name in ("published", "processed", "dropped", "breaks", "commands")}
+    assert counts["processed"] == lines, (place, counts, lines)
+    assert counts["published"] == counts["processed"] + counts["dropped"], (place, counts)
+    return counts
+
+
+try:
+    report("boots before its radar", says=up())
+    assert "waiting" in json.dumps(status()).lower() or status()["notice"], status()
+    radar_on()
+    until("the first poses", lambda: status()["poses"] > 10)
+    report("has its radar", poses=status()["poses"])
+
+    radar_off()
+    time.sleep(4)
+    report("has lost its radar", notice=status().get("notice"))
+    radar_on()
+    await_poses(10)
+    report("has it again, with a clock that has stepped back", poses=status()["poses"])
+
+    report(call("reset", out, "--pose", "5,2,90", "--keep-map").strip())
+    await_poses(5)
+    report(call("new-map", out).strip())
+    await_poses(40)
+
+    supervisor = status()["pid"]
+    for process in status()["processes"][:3]:
+        os.kill(process["pid"], signal.SIGKILL)
+    await_poses(5)
+    os.kill(supervisor, signal.SIGKILL)
+    time.sleep(2)
+    report("all of it was killed", says=up())
+    await_poses(10)
+    poses = status()["poses"]
+    assert poses > 60, poses
+    report("continues from its journal", poses=poses)
+
+    program = f"{folder}/gyre-new"
+    shutil.copy(gyre, program)
+    with open(program, "ab") as file:
+        file.write(b"another build")
+    report(call("down", out).strip().splitlines()[0])
+    report("is upgraded", says=up(program))
+    await_poses(10)
+    [closed] = [name for name in os.listdir(folder) if name.startswith("out.")]
+    report("the run before is closed", folder=closed, **finished(f"{folder}/{closed}"))
+
+    call("down", out)
+    call("map", f"{folder}/{closed}", "--format=folder", "--out", f"{folder}/map")
+    report("starts in its map", says=up(program, "--set", f"slam.map={folder}/map"))
+    until("poses", lambda: status()["poses"] > 10)
+    report(call("locate", out, "--pose", "0,0,0", "--sigma", "20,90", program=program).strip())
+    await_poses(20)
+    call("down", out)
+    places = sorted(name for name in os.listdir(folder) if name.startswith("out"))
+    for place in places:
+        report(f"the end of {place}", **finished(f"{folder}/{place}"))
+finally:
+    subprocess.run([gyre, "down", out], capture_output=True)
+    if radar:
+        radar.kill()
