@@ -411,8 +411,8 @@ fn a_node_of_ros_receives_the_velocities_by_doppler_and_what_motions_rest_on() {
     }
     let parts = topics["/diagnostics"].iter().map(|it| &it["status"]);
     let parts = parts.flat_map(|it| it.as_array().unwrap());
-    let of_motions = parts.filter(|part| part["name"] == "gyre: motion");
-    let newest = of_motions.last().unwrap();
+    let mut of_motions = parts.filter(|part| part["name"] == "gyre: motion");
+    let newest = of_motions.next_back().unwrap();
     assert_eq!(newest["message"], "radar and others", "{newest}");
     let values = newest["values"].as_array().unwrap();
     let agrees = values.iter().find(|it| it["key"] == "Doppler agrees");
