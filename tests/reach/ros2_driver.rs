@@ -62,6 +62,7 @@ fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
 
 /// Of a driver as it is, of one before 2024, and of one that publishes whole turns.
 #[test]
+#[ignore = ".ci/nightly: three drivers"]
 fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
     only_if!(can_speak());
     let scans = recording::SCANS / 2;
@@ -87,6 +88,7 @@ fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
 }
 
 #[test]
+#[ignore = ".ci/nightly: six seconds of azimuths"]
 fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
     only_if!(can_speak());
     let domain = domain(3);
@@ -121,6 +123,7 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
 }
 
 #[test]
+#[ignore = ".ci/nightly: a drive with GNSS"]
 fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
     only_if!(can_speak());
     let drive = gnss::drive();

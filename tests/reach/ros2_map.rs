@@ -30,9 +30,10 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
     ];
     let mut bridge = Program::bridge(&run, &domain, &options);
     let peer = Program::peer("observer.py", &[&domain, "/car"]);
-    let node = Program::node(&domain, &["/car"]);
+    let mut node = Program::node(&domain, &["/car"]);
     run.complete();
     bridge.await_end();
+    node.await_words("\"topic\": \"/car/map\"");
     let mut topics = received(node);
     topics.extend(received(peer));
 

@@ -85,8 +85,11 @@ subscribe(Clock, "/clock", LOSSY)
 subscribe(TransitionEvent, namespace + "/gyre/transition_event")
 
 
+clients = {}
+
+
 def ask(kind, name, **fields):
-    client = node.create_client(kind, f"{namespace}/gyre/{name}")
+    client = clients.get(name) or clients.setdefault(name, node.create_client(kind, f"{namespace}/gyre/{name}"))
     assert client.wait_for_service(10), name
     answer = client.call_async(kind.Request(**fields))
     rclpy.spin_until_future_complete(node, answer, timeout_sec=10)
