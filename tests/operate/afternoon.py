@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 
-gyre, folder = sys.argv[1:]
+gyre, folder = map(os.path.abspath, sys.argv[1:])
 began = time.monotonic()
 out, config = f"{folder}/out", f"{folder}/robot.toml"
 with socket.socket() as free:
@@ -54,7 +54,7 @@ def up(program=None, *settings):
 
 def status():
     [run] = json.loads(call("ps", out, "--json"))
-    return run
+    return run["status"]
 
 
 def until(what, look, limit_s=60):
@@ -98,14 +98,14 @@ def finished(place):
 
 try:
     report("boots before its radar", says=up())
-    assert "waiting" in json.dumps(status()).lower() or status()["notice"], status()
+    assert status()["phase"] == "waiting-for-radar", status()
     radar_on()
     until("the first poses", lambda: status()["poses"] > 10)
     report("has its radar", poses=status()["poses"])
 
     radar_off()
     time.sleep(4)
-    report("has lost its radar", notice=status().get("notice"))
+    report("has lost its radar", phase=status()["phase"])
     radar_on()
     await_poses(10)
     report("has it again, with a clock that has stepped back", poses=status()["poses"])
@@ -133,12 +133,12 @@ try:
         file.write(b"another build")
     report(call("down", out).strip().splitlines()[0])
     report("is upgraded", says=up(program))
-    await_poses(10)
+    await_poses(60)
     [closed] = [name for name in os.listdir(folder) if name.startswith("out.")]
     report("the run before is closed", folder=closed, **finished(f"{folder}/{closed}"))
 
     call("down", out)
-    call("map", f"{folder}/{closed}", "--format=folder", "--out", f"{folder}/map")
+    call("map", out, "--format=folder", "--out", f"{folder}/map")
     report("starts in its map", says=up(program, "--set", f"slam.map={folder}/map"))
     until("poses", lambda: status()["poses"] > 10)
     report(call("locate", out, "--pose", "0,0,0", "--sigma", "20,90", program=program).strip())
