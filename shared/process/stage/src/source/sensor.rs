@@ -4,7 +4,8 @@
 use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_contract::{
-    GnssHeader, Intake, IntakeHeader, NumberedBy, Scan, ScanHeader, StageId, control::Received,
+    GnssHeader, Intake, IntakeHeader, NumberedBy, Scan, ScanHeader, StageId,
+    control::{RECEIVED, Received},
     run::StageCounters,
 };
 use gyre_geometry::samples::{MAX_SAMPLES, Sample, SampleKind};
@@ -94,7 +95,7 @@ pub fn run_sensor(
 struct Stream<'a> {
     feed: Feed<'a, Scan>,
     intake: Writer<Intake>,
-    received: Numbers<9>,
+    received: Numbers<RECEIVED>,
     live: Option<LiveSensors>,
 }
 
