@@ -1,6 +1,8 @@
 //! A disk that is full for a while: the limit of the size of a file stands for it. One test,
 //! because the limit and the state of the disk are those of the process.
 
+#![allow(clippy::unwrap_used)]
+
 use std::sync::{Arc, atomic::AtomicBool};
 
 use gyre_storage::{

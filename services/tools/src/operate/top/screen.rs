@@ -144,16 +144,19 @@ fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
 
 /// Returns the clock of the radar against this host's, in words.
 fn clock(clock: &SensorClock) -> String {
-    let [offset, jitter] = [clock.offset_ns, clock.jitter_ns].map(|ns| ns as f64 * 1e-6);
+    let sign = if clock.offset_ns > 0 {
+        "behind"
+    } else {
+        "ahead"
+    };
+    let seconds = |ns: i64| duration(ns.unsigned_abs() as f64 * 1e-9);
+    let (offset, jitter) = (seconds(clock.offset_ns), seconds(clock.jitter_ns));
     let steps = match clock.steps {
         0 => String::new(),
         1 => ", set once".to_owned(),
         steps => format!(", set {steps} times"),
     };
-    format!(
-        "  radar's clock {:+.1} ms, jitter {jitter:.1} ms{steps}",
-        -offset
-    )
+    format!("  radar's clock {offset} {sign}, jitter {jitter}{steps}")
 }
 
 /// Returns the basis of the newest motion, how often gyro, wheels and Doppler were used, and the
