@@ -124,7 +124,7 @@ fn poses_that_the_map_does_not_know_are_cut_off_and_computed_anew() {
     let run = interrupted();
     append_unknown_poses(&run, 70);
     let ended = run.finish();
-    let words = "a power failure took the last 70 poses";
+    let words = "the last 70 poses of";
     ended.succeeded().says(words);
     assert_eq!(run.odometry(), undisturbed());
     assert!(run.count("resumed_after") >= MIDDLE as u64);

@@ -1,10 +1,12 @@
 //! `gyre watch`: the page in a browser, who may read it, and the metrics.
 
-use std::{thread, time::Duration};
+use std::{process::Command, thread, time::Duration};
 
 use crate::{
-    common::{Browser, Run, Server},
+    common::{Browser, Ended, Run, Server, can, recording},
+    live::radar::{Radar, run_at},
     operate::commands::ask,
+    reach::only_if,
 };
 
 /// A drive that is still going on when a test ends it.
@@ -118,6 +120,45 @@ fn metrics_count_poses_delays_and_restarts() {
     assert!(metrics.trim_end().ends_with("# EOF"), "{metrics}");
     running.interrupt();
     server.interrupt();
+}
+
+/// The rules of the alerts, where a folder with the files of Prometheus is.
+const RULES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/prometheus");
+
+#[test]
+fn a_run_of_a_live_radar_has_all_metrics_of_the_alerts() {
+    // At another pace there is no clock to compare.
+    let radar = Radar::playing(recording::small(), &["--repeat", "--rate", "1"]);
+    let run = run_at(&radar.address);
+    let running = run.started(6);
+    let server = Server::start(&run, "127.0.0.1", &[]);
+    let mut metrics = String::new();
+    while !metrics.contains("\ngyre_radar_clock_steps_total 0") {
+        thread::sleep(Duration::from_millis(100));
+        metrics = server.get("/metrics", &[]);
+    }
+    let rules = std::fs::read_to_string(format!("{RULES}/gyre.rules.yml")).unwrap();
+    let words = rules.split(|c: char| !c.is_alphanumeric() && c != '_' && c != ':');
+    for name in words.filter(|word| word.starts_with("gyre_")) {
+        let has = |line: &str| {
+            line.strip_prefix(name)
+                .is_some_and(|it| it.starts_with([' ', '{']))
+        };
+        assert!(metrics.lines().any(has), "{name}: {metrics}");
+    }
+    running.interrupt();
+    server.interrupt();
+}
+
+#[test]
+fn each_alert_fires_on_the_series_of_its_fault_and_none_on_those_of_a_healthy_run() {
+    only_if!(can(&["promtool", "--version"]));
+    let mut promtool = Command::new("promtool");
+    promtool
+        .args(["test", "rules", "gyre.rules.test.yml"])
+        .current_dir(RULES);
+    let ended = Ended::of(promtool);
+    assert!(ended.status.success(), "{ended:?}");
 }
 
 const POSES: &str = "Number(document.getElementById('poses').textContent)";

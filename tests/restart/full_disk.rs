@@ -3,7 +3,15 @@
 
 use std::{fs::File, path::Path, process::Command};
 
-use crate::common::{Ended, Run, entries_of, gyre, recording, undisturbed, with_tmpfs, wrapped};
+use crate::{
+    common::{
+        Ended, Run, Running, can_mount, entries_of, gyre, odometry, recording, undisturbed,
+        with_tmpfs, wrapped,
+    },
+    live::radar::{Radar, run_at},
+    operate::commands::{ask, await_status},
+    restart::faults::tools::Mount,
+};
 
 /// A device on which every write fails as on a full disk.
 fn full() -> File {
@@ -56,10 +64,10 @@ fn an_error_that_cannot_be_printed_is_told_by_the_exit_code() {
 
 #[test]
 fn a_full_disk_ends_a_run_with_the_reason_and_a_live_one_when_all_poses_are_computed() {
-    let last = format!("the last pose is {}", recording::SCANS - 1);
+    let last = format!("to {} are lost", recording::SCANS - 1);
     for (mode, words) in [
         ("lossless", &["No space left on device"][..]),
-        ("live", &["is full: poses continue", &last]),
+        ("live", &["was full: poses", &last]),
     ] {
         let run = Run::of_recording().set(&format!("run.mode={mode}"));
         let run = run.rate("2");
@@ -70,6 +78,61 @@ fn a_full_disk_ends_a_run_with_the_reason_and_a_live_one_when_all_poses_are_comp
         let ended = run.start_as(command).finish();
         ended.failed_with(words);
         ended.failed_with(&[&run.out().display().to_string()]);
+    }
+}
+
+/// More than a run has.
+const PLENTY: u64 = 256 << 20;
+
+/// Waits until more than this number of poses are in memory only.
+fn await_held(run: &Run, running: &Running, poses: u64) {
+    let kept = running.poses() as u64;
+    await_status(run, "poses that are held", |status| {
+        status["disk_is_full"] == true && status["poses"].as_u64() > Some(kept + poses)
+    });
+}
+
+#[test]
+fn poses_on_a_full_disk_are_written_when_there_is_room_again() {
+    if !can_mount() {
+        return;
+    }
+    let run = Run::of_recording().sets("run.mode=live source.repeat=true source.scans=4000");
+    let run = run.rate("2");
+    let mount = Mount::tmpfs(run.out(), PLENTY);
+    let mut running = run.started(3);
+    mount.fill(0);
+    running.await_words("held in memory until there is room");
+    ask(&run, &["ps", "--check"]).refused_with(&["the disk of", "is full: poses continue"]);
+    await_held(&run, &running, 3);
+    mount.free();
+    running.await_words("the disk has room again, and has all poses");
+    running.interrupt();
+    run.assert_counts("breaks=0");
+    let rows = odometry::rows(&run.odometry());
+    assert_eq!(rows.len() as u64 + 1, run.count("processed"));
+}
+
+#[test]
+fn a_live_run_begins_again_behind_its_journal_if_poses_of_a_full_disk_are_lost() {
+    if !can_mount() {
+        return;
+    }
+    for stage in ["pose-integration", "refinement"] {
+        let radar = Radar::playing(recording::small(), &["--repeat"]);
+        let run = run_at(&radar.address);
+        let mount = Mount::tmpfs(run.out(), PLENTY);
+        let mut running = run.started(4);
+        mount.fill(0);
+        // More than the refinement computes again after a death.
+        await_held(&run, &running, 12);
+        running.kill(stage);
+        running.await_words("; starting over");
+        mount.free();
+        let kept = running.poses();
+        running.await_poses(kept + 8);
+        running.interrupt();
+        run.assert_counts("breaks=1");
     }
 }
 

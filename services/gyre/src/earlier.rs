@@ -301,6 +301,15 @@ fn known_poses(
     };
     match known {
         Some(poses) => Ok(poses),
+        // A new chain of motions begins, without the old map.
+        None if configuration.is_radar() => {
+            print::note(format_args!(
+                "gyre: {} does not know pose {}, as after a full disk: the filters of other sensors begin again",
+                path.display(),
+                complete.saturating_sub(1)
+            ));
+            Ok(complete)
+        }
         // Not more than a power failure can take, soon after the start.
         None if content.poses <= 2 * GroupSync::LIMIT => {
             print::note(format_args!(

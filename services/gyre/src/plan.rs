@@ -72,10 +72,15 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
         return None;
     }
     let [gyre, out, file] = [gyre, out, record.file.as_path()].map(Path::to_string_lossy);
-    let (split_mb, split_s) = (record.split_mb.to_string(), record.split_s.to_string());
+    let limits = [
+        ("--split-mb", record.split_mb.to_string()),
+        ("--split-s", record.split_s.to_string()),
+        ("--keep-mb", record.keep_mb.to_string()),
+        ("--keep-s", record.keep_s.to_string()),
+    ];
     let topics = record.topics.join(",");
     let mut command = vec![&*gyre, "record", &*out, "--continues", "--to", &*file];
-    command.extend(["--split-mb", &split_mb, "--split-s", &split_s]);
+    command.extend(limits.iter().flat_map(|(name, limit)| [*name, limit]));
     if !topics.is_empty() {
         command.extend(["--topics", &topics]);
     }

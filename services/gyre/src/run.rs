@@ -19,6 +19,7 @@ use gyre_datasets::SampleLog;
 use gyre_geometry::samples::SensorKind;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
+use gyre_stage::sink::has_lost_poses;
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
 use gyre_tools::{doctor::check_shared_memory, operate::detach_if_asked};
@@ -135,7 +136,7 @@ fn make_ready(
     plan::require_recordable(&configuration.record, out.path(), recording_goes_on)?;
     if let Some(begun) = unfinished.filter(|begun| begun.lost > 0) {
         print::note(format_args!(
-            "gyre: a power failure took the last {} poses of {}: going on after {}",
+            "gyre: the last {} poses of {} had not reached the disk: going on after {}",
             begun.lost,
             out.path().display(),
             begun.poses
@@ -178,7 +179,11 @@ fn play(
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let started = Instant::now();
     let report = supervise_shown(&plan, signals, &ready, resumed, &mut notifier);
-    if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
+    if let Err(failure) = &report
+        && (matches!(failure, SuperviseError::TransportStuck) || has_lost_poses(&plan.manifest))
+        && !has_started_over_at(resumed)
+    {
+        print::note(format_args!("gyre: {failure}; starting over"));
         let begins_anew = earlier::is_untouched(&out)?;
         drop((root, out));
         return start_over(resumed, begins_anew);
@@ -425,13 +430,10 @@ fn has_started_over_at(poses: usize) -> bool {
     env::var(STARTED_OVER).is_ok_and(|before| before == poses.to_string())
 }
 
-/// Executes the same command again. The transport hung on the remains of a dead process, which are
-/// removed now: it cannot be used again in this process. The run resumes from the journal; if it
-/// was replacing a complete run and has computed nothing, it begins again as requested.
+/// Executes the same command again: the transport hung on the remains of a dead process, which are
+/// removed now, or poses are lost because the disk was full. The run resumes from the journal; if
+/// it was replacing a complete run and has computed nothing, it begins again as requested.
 fn start_over(resumed: usize, begins_anew: bool) -> Result<ExitCode, Failure> {
-    print::note(
-        "gyre: the transport did not finish cleaning up after a dead process; starting over",
-    );
     // Computed poses are not discarded.
     let arguments = env::args_os().filter(|argument| begins_anew || argument != "--fresh");
     let failed = execute_again(arguments, STARTED_OVER, &resumed.to_string());

@@ -3,6 +3,7 @@
 //! [`Intake`] makes scans of azimuths, whatever the transport.
 
 mod ask;
+mod clock_watch;
 mod connection;
 mod intake;
 mod radar;

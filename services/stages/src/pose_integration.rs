@@ -1,7 +1,7 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each
 //! pose before it is published. A reset by a command begins at its pose. With SLAM it logs
 //! keyframes, with objects each scan. In live mode poses continue when the disk is full, and are
-//! not kept from then on.
+//! held in memory until there is room.
 
 use gyre_contract::{
     Command, Commands, Item, Masked, MotionHeader, PoseHeader, StageId, compose, flag,
@@ -12,7 +12,7 @@ use gyre_journal::{Journal, PoseLog, keyframes::Keyframes, scans::Scans};
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{Launch, Sink, sink};
-use gyre_storage::{continue_when_full, was_full};
+use gyre_storage::{Disk, continue_when_full, disk};
 use gyre_transport::{
     Manifest, RunError, clock, reader::Received, services::LogId, transport::Notifier,
 };
@@ -22,6 +22,10 @@ use crate::{points, unusable};
 pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     launch.take_place()?;
     let out = &launch.manifest.out;
+    if let Some(notice) = sink::notice(&launch.manifest) {
+        let loss = format!("{notice}; the process that held them has died, and they are lost");
+        return Err(sink::poses_lost(&launch.manifest, loss));
+    }
     if launch.manifest.live {
         continue_when_full();
     }
@@ -46,8 +50,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
         commands: Commands::open(out).map_err(RunError::input)?,
         last,
         logs,
-        // A stage that died on the full disk has left it.
-        loss: sink::notice(&launch.manifest),
+        held_from: None,
+        lost_from: None,
         manifest: launch.manifest.clone(),
     };
     let counters = sink::run(launch, &mut integration)?;
@@ -63,8 +67,10 @@ struct Integration {
     /// The logs that the run has, and what wakes the followers of each.
     logs: Vec<(Box<dyn PoseLog>, Notifier)>,
     manifest: Manifest,
-    /// The sentence about the poses that are not kept.
-    loss: Option<String>,
+    /// The first pose since the disk is full, and the first one that is lost because the memory for
+    /// them is used up.
+    held_from: Option<u64>,
+    lost_from: Option<u64>,
 }
 
 impl Sink for Integration {
@@ -95,15 +101,8 @@ impl Sink for Integration {
             }
         }
         self.journal.append(&pose).map_err(unusable)?;
-        if was_full() && self.loss.is_none() {
-            let (out, seq) = (self.manifest.out.display(), pose.item.seq);
-            let loss = format!(
-                "the disk of {out} is full: poses continue, but those from pose {seq} on are not kept: they are in no result, and the run can be resumed only from those before"
-            );
-            sink::set_notice(&self.manifest, &loss)?;
-            self.loss = Some(loss);
-        }
         self.last = Some(pose);
+        self.look_at_disk(pose.item.seq)?;
         Ok(pose)
     }
 
@@ -160,11 +159,48 @@ impl Integration {
         self.journal.sync().map_err(unusable)
     }
 
-    fn require_kept(&self) -> Result<(), RunError> {
-        let (Some(loss), Some(last)) = (&self.loss, self.last) else {
-            return Ok(());
+    /// Reports when the disk is full, and when it has room again. If poses were lost meanwhile, the
+    /// run has to begin again behind those that it has kept.
+    fn look_at_disk(&mut self, seq: u64) -> Result<(), RunError> {
+        let out = self.manifest.out.display();
+        let notice = match (disk(), self.held_from, self.lost_from) {
+            (Disk::IsFull, None, _) => {
+                self.held_from = Some(seq);
+                format!(
+                    "the disk of {out} is full: poses continue, and those from pose {seq} on are held in memory until there is room"
+                )
+            }
+            (Disk::Lost(false), _, None) => {
+                self.lost_from = Some(seq);
+                format!(
+                    "the disk of {out} is full, and the memory for poses too: poses continue, but those from pose {seq} on are lost"
+                )
+            }
+            (Disk::Lost(true), ..) => return Err(sink::poses_lost(&self.manifest, self.loss())),
+            (Disk::HasRoom, Some(first), _) => {
+                self.held_from = None;
+                tracing::info!("the disk has room again, and has poses {first} to {seq}");
+                String::new()
+            }
+            _ => return Ok(()),
         };
-        let seq = last.item.seq;
-        Err(RunError::Input(format!("{loss}; the last pose is {seq}")))
+        sink::set_notice(&self.manifest, &notice)
+    }
+
+    fn require_kept(&self) -> Result<(), RunError> {
+        match disk() {
+            Disk::HasRoom => Ok(()),
+            Disk::IsFull | Disk::Lost(_) => Err(RunError::Input(self.loss())),
+        }
+    }
+
+    fn loss(&self) -> String {
+        let first = match disk() {
+            Disk::Lost(true) => self.lost_from,
+            _ => self.held_from,
+        };
+        let (out, last) = (self.manifest.out.display(), self.last.map(|it| it.item.seq));
+        let (first, last) = (first.or(last).unwrap_or_default(), last.unwrap_or_default());
+        format!("the disk of {out} was full: poses {first} to {last} are lost, and in no result")
     }
 }

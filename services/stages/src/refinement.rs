@@ -10,9 +10,9 @@ use gyre_radar::PointsConfig;
 use gyre_stage::{
     Launch, Stage,
     inputs::{Joined, JoinedView},
-    stage,
+    sink, stage,
 };
-use gyre_transport::{RunError, writer::Draft};
+use gyre_transport::{Manifest, RunError, writer::Draft};
 
 use crate::{estimates, points, unusable};
 
@@ -31,6 +31,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
     let checkpoint = Checkpoint::open(&path, window, config.keyframes, refiner.keyframe_cells())
         .map_err(unusable)?;
     let mut stage = RefinementStage {
+        manifest: manifest.clone(),
         refiner,
         checkpoint,
         next: None,
@@ -39,6 +40,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, RunError> {
 }
 
 struct RefinementStage {
+    manifest: Manifest,
     refiner: Refiner,
     checkpoint: Checkpoint,
     /// The item that the refiner expects next; `None` after a start.
@@ -90,9 +92,14 @@ impl RefinementStage {
             let restored = self.checkpoint.restore(before, &mut self.refiner);
             // A chain continues only with the filters of other sensors, which the first chain
             // lacks.
-            restored.or_else(|error| match starts_chain {
-                true => Ok(()),
-                false => Err(unusable(error)),
+            restored.or_else(|error| match (starts_chain, sink::notice(&self.manifest)) {
+                (true, _) => Ok(()),
+                // The process before held the state in memory.
+                (false, Some(notice)) => {
+                    let loss = format!("{notice}; the refinement has died meanwhile");
+                    Err(sink::poses_lost(&self.manifest, loss))
+                }
+                (false, None) => Err(unusable(error)),
             })?;
         }
         if starts_chain {

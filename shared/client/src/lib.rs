@@ -34,7 +34,7 @@ pub mod observer;
 mod process_stat;
 mod usage;
 
-pub use gyre_storage::RecordReader;
+pub use gyre_storage::{RecordReader, free_bytes, has_room};
 pub use gyre_transport::{
     AnyMessage, Listener, Manifest, RecordedMessage, RunError, clock, log,
     reader::Received,

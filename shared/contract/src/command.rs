@@ -255,11 +255,20 @@ impl Commands {
         self.refresh()?;
         for number in 1..=self.len() {
             if self.from_ns(number).is_none() {
-                self.append(&Line {
+                let appended = self.append(&Line {
                     number,
                     command: None,
                     from_ns: Some(stamp_ns),
-                })?;
+                });
+                match appended {
+                    // A full disk ends no run: the time is known here, for as long as masking lives.
+                    Err(CommandError::File { source, .. })
+                        if source.kind() == io::ErrorKind::StorageFull =>
+                    {
+                        self.given[number as usize - 1].1 = Some(stamp_ns);
+                    }
+                    appended => appended?,
+                }
             }
         }
         Ok(self.applied(stamp_ns))

@@ -64,6 +64,9 @@ pub struct Status {
     /// The trouble of the whole run: it waits for its radar, or its disk is full.
     #[serde(default)]
     pub notice: Option<String>,
+    /// True while poses are held in memory, or lost, because the disk is full.
+    #[serde(default)]
+    pub disk_is_full: bool,
     pub swap: Option<PendingSwap>,
     pub processes: Vec<ProcessStatus>,
 }
@@ -143,6 +146,21 @@ pub struct Received {
     pub connections: u64,
     pub is_receiving: bool,
     pub last_scan: Option<LastScan>,
+    /// `None` if the sensor has no clock, or has sent no scan.
+    #[serde(default)]
+    pub clock: Option<SensorClock>,
+}
+
+/// The clock of a live sensor against this host's, over the last scans.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SensorClock {
+    /// This host's time minus the sensor's at the arrival of a scan, with the least delay of the
+    /// network, ns.
+    pub offset_ns: i64,
+    /// The delay beyond that which nine of ten scans have at most, ns.
+    pub jitter_ns: i64,
+    /// The number of times that one of the clocks was set.
+    pub steps: u64,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -152,6 +170,9 @@ pub struct LastScan {
     /// When its last azimuth was read, `CLOCK_MONOTONIC`, ns.
     pub at_ns: i64,
 }
+
+/// [`Received`] as numbers.
+pub const RECEIVED: usize = 13;
 
 impl Received {
     #[must_use]
@@ -167,8 +188,9 @@ impl Received {
         counters.reconnections = self.reconnections();
     }
 
-    pub fn to_numbers(self) -> [u64; 9] {
+    pub fn to_numbers(self) -> [u64; RECEIVED] {
         let scan = self.last_scan.unwrap_or_default();
+        let clock = self.clock.unwrap_or_default();
         [
             self.missing_azimuths,
             self.scans_left_out,
@@ -179,13 +201,19 @@ impl Received {
             self.last_scan.is_some().into(),
             scan.stamp_ns as u64,
             scan.at_ns as u64,
+            self.clock.is_some().into(),
+            clock.offset_ns as u64,
+            clock.jitter_ns as u64,
+            clock.steps,
         ]
     }
 
-    pub fn of_numbers(numbers: [u64; 9]) -> Self {
+    pub fn of_numbers(numbers: [u64; RECEIVED]) -> Self {
         let [missing_azimuths, scans_left_out, damaged_messages, ..] = numbers;
-        let [.., foreign_messages, connections, receives, has_scan, _, _] = numbers;
-        let [.., stamp_ns, at_ns] = numbers.map(|number| number as i64);
+        let [_, _, _, foreign_messages, connections, receives, ..] = numbers;
+        let [.., has_scan, _, _, has_clock, _, _, steps] = numbers;
+        let signed = numbers.map(|number| number as i64);
+        let [.., stamp_ns, at_ns, _, offset_ns, jitter_ns, _] = signed;
         Self {
             missing_azimuths,
             scans_left_out,
@@ -194,6 +222,11 @@ impl Received {
             connections,
             is_receiving: receives != 0,
             last_scan: (has_scan != 0).then_some(LastScan { stamp_ns, at_ns }),
+            clock: (has_clock != 0).then_some(SensorClock {
+                offset_ns,
+                jitter_ns,
+                steps,
+            }),
         }
     }
 }
@@ -204,8 +237,8 @@ mod tests {
 
     #[test]
     fn what_is_received_is_read_as_it_was_written() {
-        let numbers = [1, 2, 3, 4, u64::MAX, 1, 1, 5, 6];
-        for numbers in [numbers, [0; 9]] {
+        let numbers = [1, 2, 3, 4, u64::MAX, 1, 1, 5, 6, 1, u64::MAX, 7, 8];
+        for numbers in [numbers, [0; RECEIVED]] {
             assert_eq!(Received::of_numbers(numbers).to_numbers(), numbers);
         }
     }

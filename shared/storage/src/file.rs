@@ -5,7 +5,7 @@ use std::{
     io,
     os::unix::fs::{FileExt, MetadataExt},
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     thread,
     time::{Duration, Instant},
 };
@@ -15,6 +15,7 @@ use crate::record::{self, Operation};
 use crate::{
     StorageError,
     folder::sync_folder,
+    held::{Held, is_lost, lose, unless_full},
     lock::{self, Attempt, try_lock_existing},
 };
 
@@ -22,30 +23,16 @@ use crate::{
 const LOCK_WAIT: Duration = Duration::from_secs(1);
 const LOCK_PAUSE: Duration = Duration::from_millis(5);
 
-/// True if a full disk is no error of this process, and from when it was full.
-static CONTINUES: AtomicBool = AtomicBool::new(false);
-static IS_FULL: AtomicBool = AtomicBool::new(false);
-
-/// Lets this process continue when the disk is full: nothing that it changes in place is kept from
-/// then on, because its files may not have gaps.
-pub fn continue_when_full() {
-    CONTINUES.store(true, Ordering::Relaxed);
-}
-
-/// Returns whether the disk was full since [`continue_when_full`].
-pub fn was_full() -> bool {
-    IS_FULL.load(Ordering::Relaxed)
-}
-
-fn is_full(error: &io::Error) -> bool {
-    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
-}
+/// Writes that are made at once when a full disk has room again: half as many as may be in danger
+/// of a power failure ([`GroupSync`](crate::GroupSync)). They survive one before the next are made.
+const BATCH: usize = 16;
 
 #[derive(Debug)]
 pub struct File {
     path: PathBuf,
     file: fs::File,
+    /// The writes that wait for room on the disk; `None`: a full disk is an error.
+    held: Option<Arc<Mutex<Held>>>,
 }
 
 impl File {
@@ -69,6 +56,7 @@ impl File {
         Ok(Self {
             path: path.to_owned(),
             file,
+            held: Some(Arc::default()),
         })
     }
 
@@ -98,6 +86,7 @@ impl File {
         Ok(Some(Self {
             path: path.to_owned(),
             file,
+            held: None,
         }))
     }
 
@@ -110,6 +99,7 @@ impl File {
         Ok(Self {
             path: self.path.clone(),
             file: file.map_err(StorageError::at("read", &self.path))?,
+            held: self.held.clone(),
         })
     }
 
@@ -161,32 +151,69 @@ impl File {
         }
     }
 
-    fn unless_full(&self, done: io::Result<()>, action: &'static str) -> Result<(), StorageError> {
-        match done {
-            Err(error) if is_full(&error) && CONTINUES.load(Ordering::Relaxed) => {
-                IS_FULL.store(true, Ordering::Relaxed);
-                Ok(())
-            }
-            done => done.map_err(StorageError::at(action, &self.path)),
+    /// Writes `bytes` at `offset`. A process that is killed meanwhile has written a first part of
+    /// them. After [`continue_when_full`](crate::continue_when_full) a full disk is not an error.
+    pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<(), StorageError> {
+        self.write_held()?;
+        let Some(mut held) = self.held() else {
+            return self.write_now(bytes, offset);
+        };
+        let may_write = held.is_empty() && !is_lost();
+        if !(may_write && unless_full(self.write_now(bytes, offset))?) {
+            held.push(offset, bytes);
         }
+        Ok(())
     }
 
-    /// Writes `bytes` at `offset`. A process that is killed meanwhile has written a first part of
-    /// them.
-    /// A full disk is not an error after [`continue_when_full`].
-    pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<(), StorageError> {
-        if was_full() {
-            return Ok(());
-        }
-        self.unless_full(self.file.write_all_at(bytes, offset), "write")?;
+    fn write_now(&self, bytes: &[u8], offset: u64) -> Result<(), StorageError> {
+        let written = self.file.write_all_at(bytes, offset);
+        written.map_err(StorageError::at("write", &self.path))?;
         #[cfg(feature = "record")]
-        if !was_full() {
-            record::push(&self.path, || Operation::Write {
-                path: self.path.clone(),
-                offset,
-                bytes: bytes.to_vec(),
-            });
+        record::push(&self.path, || Operation::Write {
+            path: self.path.clone(),
+            offset,
+            bytes: bytes.to_vec(),
+        });
+        Ok(())
+    }
+
+    fn held(&self) -> Option<MutexGuard<'_, Held>> {
+        let held = self.held.as_ref()?;
+        Some(held.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Returns whether writes wait for room on the disk.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.held().is_some_and(|held| !held.is_empty())
+    }
+
+    /// Writes some of what waits; returns whether there was room.
+    fn write_held(&self) -> Result<bool, StorageError> {
+        let held = self.held().filter(|it| !it.is_empty() && it.is_due());
+        let Some(mut held) = held else {
+            return Ok(false);
+        };
+        let mut is_full = false;
+        for _ in 0..BATCH {
+            let Some((offset, bytes)) = held.front().filter(|_| !is_full) else {
+                break;
+            };
+            match unless_full(self.write_now(bytes, offset))? {
+                true => held.pop(),
+                false => is_full = true,
+            }
         }
+        held.note_attempt(is_full);
+        self.sync()?;
+        Ok(!is_full)
+    }
+
+    /// Writes all that waits, as far as there is room now.
+    pub(crate) fn write_all_held(&self) -> Result<(), StorageError> {
+        if let Some(mut held) = self.held() {
+            held.note_attempt(false);
+        }
+        while self.write_held()? {}
         Ok(())
     }
 
@@ -215,7 +242,14 @@ impl File {
     pub fn sync(&self) -> Result<(), StorageError> {
         #[cfg(feature = "record")]
         let id = record::sync_begins(&self.path);
-        self.unless_full(self.file.sync_data(), "synchronise")?;
+        let synchronised = self.file.sync_data();
+        let synchronised = synchronised.map_err(StorageError::at("synchronise", &self.path));
+        if self.held.is_none() {
+            synchronised?;
+        } else if !unless_full(synchronised)? {
+            // What is lost of the file is unknown.
+            lose();
+        }
         #[cfg(feature = "record")]
         record::push(&self.path, || Operation::SyncEnds {
             path: self.path.clone(),

@@ -2,7 +2,6 @@
 
 use std::{
     io,
-    path::PathBuf,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     thread::{self, JoinHandle},
     time::{Duration, Instant},
@@ -17,7 +16,7 @@ use crate::{File, StorageError};
 /// than [`GroupSync::INTERVAL`].
 #[derive(Debug)]
 pub struct GroupSync {
-    path: PathBuf,
+    file: File,
     shared: Arc<Shared>,
     worker: Option<JoinHandle<()>>,
 }
@@ -51,12 +50,14 @@ impl Shared {
     }
 
     /// Waits until it is time for a synchronisation; returns the number of changes that it covers,
-    /// or `None` at the end.
-    fn next(&self, last: Option<Instant>) -> Option<u64> {
+    /// or `None` at the end. Changes that wait for room on the disk are covered once they are
+    /// written.
+    fn next(&self, file: &File, last: Option<Instant>) -> Option<u64> {
         let mut progress = self.lock();
         loop {
-            let pending = progress.made - progress.safe;
-            if progress.failure.is_some() || (pending == 0 && progress.ending) {
+            let (pending, is_behind) = (progress.made - progress.safe, file.is_behind());
+            let is_done = pending == 0 || is_behind;
+            if progress.failure.is_some() || (is_done && progress.ending) {
                 return None;
             }
             if pending == 0 {
@@ -66,17 +67,18 @@ impl Shared {
             let elapsed = last.map_or(GroupSync::INTERVAL, |last| last.elapsed());
             let left = GroupSync::INTERVAL.saturating_sub(elapsed);
             let is_urgent = progress.ending || progress.awaited > progress.safe;
-            if left.is_zero() || is_urgent || pending >= GroupSync::LIMIT / 2 {
+            if !is_behind && (left.is_zero() || is_urgent || pending >= GroupSync::LIMIT / 2) {
                 return Some(progress.made);
             }
-            let waited = self.changed.wait_timeout(progress, left);
+            let limit = if is_behind { GroupSync::INTERVAL } else { left };
+            let waited = self.changed.wait_timeout(progress, limit);
             progress = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
     fn work(&self, file: &File) {
         let mut last = None;
-        while let Some(covered) = self.next(last) {
+        while let Some(covered) = self.next(file, last) {
             last = Some(Instant::now());
             let synchronised = file.sync();
             let mut progress = self.lock();
@@ -106,20 +108,21 @@ impl GroupSync {
             }),
             changed: Condvar::new(),
         });
-        let (path, file) = (file.path().to_owned(), file.try_clone()?);
-        let of_worker = Arc::clone(&shared);
+        let (of_worker, for_worker) = (Arc::clone(&shared), file.try_clone()?);
+        let file = file.try_clone()?;
         let worker = thread::Builder::new()
             .name("sync".to_owned())
-            .spawn(move || of_worker.work(&file))
-            .map_err(StorageError::at("synchronise", &path))?;
+            .spawn(move || of_worker.work(&for_worker))
+            .map_err(StorageError::at("synchronise", file.path()))?;
         Ok(Self {
-            path,
+            file,
             shared,
             worker: Some(worker),
         })
     }
 
-    /// Counts a change that has been made. Waits while [`Self::LIMIT`] are in danger.
+    /// Counts a change that has been made. Waits while [`Self::LIMIT`] are in danger, but not for
+    /// room on the disk.
     /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn changed(&self) -> Result<(), StorageError> {
         let mut progress = self.shared.lock();
@@ -129,20 +132,26 @@ impl GroupSync {
         if pending == 1 || pending == Self::LIMIT / 2 {
             self.shared.changed.notify_all();
         }
-        while progress.made - progress.safe > Self::LIMIT && progress.failure.is_none() {
+        while progress.made - progress.safe > Self::LIMIT
+            && progress.failure.is_none()
+            && !self.file.is_behind()
+        {
+            self.shared.changed.notify_all();
             progress = self.shared.wait(progress);
         }
         self.result(&progress)
     }
 
-    /// Waits until all changes are safe. Dropped without that, nobody learns of a failure.
+    /// Waits until all changes are safe for which the disk has room. Dropped without that, nobody
+    /// learns of a failure.
     /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn finish(&self) -> Result<(), StorageError> {
+        self.file.write_all_held()?;
         let mut progress = self.shared.lock();
         let made = progress.made;
         progress.awaited = made;
         self.shared.changed.notify_all();
-        while progress.safe < made && progress.failure.is_none() {
+        while progress.safe < made && progress.failure.is_none() && !self.file.is_behind() {
             progress = self.shared.wait(progress);
         }
         self.result(&progress)
@@ -151,7 +160,7 @@ impl GroupSync {
     fn result(&self, progress: &Progress) -> Result<(), StorageError> {
         match &progress.failure {
             None => Ok(()),
-            Some((kind, reason)) => Err(StorageError::at("synchronise", &self.path)(
+            Some((kind, reason)) => Err(StorageError::at("synchronise", self.file.path())(
                 io::Error::new(*kind, reason.clone()),
             )),
         }

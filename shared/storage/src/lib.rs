@@ -11,6 +11,7 @@ mod durable;
 mod file;
 mod folder;
 mod group_sync;
+mod held;
 mod limited;
 pub mod lock;
 mod log;
@@ -29,13 +30,36 @@ use thiserror::Error;
 
 pub use draft::{Draft, is_draft, write};
 pub use durable::{Busy, DurableFile, Slots, is_sealed, seal};
-pub use file::{File, continue_when_full, was_full};
+pub use file::File;
 pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;
+pub use held::{Disk, continue_when_full, disk, was_full};
 pub use limited::{SETTINGS, open, read_bytes, read_text};
 pub use log::{LogError, LogMagic};
 pub use quoted::quoted;
 pub use records::{Record, RecordLog, RecordReader, records_path};
+
+/// The free bytes of a disk where it counts as having room again.
+const ROOM: u64 = 16 << 20;
+
+#[must_use]
+pub fn is_full(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+}
+
+/// Returns whether the disk of a folder, which was full, has room again.
+#[must_use]
+pub fn has_room(folder: &Path) -> bool {
+    free_bytes(folder).is_none_or(|bytes| bytes >= ROOM)
+}
+
+/// Returns the bytes that a user may still write to the disk of a folder.
+#[must_use]
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+}
 
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]
@@ -53,5 +77,11 @@ impl StorageError {
             path: path.to_owned(),
             source,
         }
+    }
+
+    /// Returns whether the disk is full, or the user's part of it.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        is_full(&self.source)
     }
 }

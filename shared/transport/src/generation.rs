@@ -41,7 +41,11 @@ impl Generation {
         let kept = lines.iter().skip(lines.len().saturating_sub(KEPT));
         let text: String = kept.map(Line::to_string).collect();
         gyre_storage::create_folder(&manifest.out.join("journal"))?;
-        gyre_storage::write(&path, text)?;
+        match gyre_storage::write(&path, text) {
+            // The line has room behind the others.
+            Err(error) if error.is_full() => append(&path, lines.last())?,
+            written => written?,
+        }
         Ok(Self(GivenAnew { generation, first }))
     }
 
@@ -72,6 +76,13 @@ pub fn skipped(
         is_skipped.then_some(GivenAnew { generation, first })
     });
     Ok(skipped.min_by_key(|it| it.first))
+}
+
+fn append(path: &Path, line: Option<&Line>) -> Result<(), RunError> {
+    let file = gyre_storage::File::open_or_create(path)?;
+    let text = line.map(Line::to_string).unwrap_or_default();
+    file.write_at(text.as_bytes(), file.length()?)?;
+    Ok(file.sync()?)
 }
 
 /// A line of the file: a generation, its first number and who gives its numbers, which a program in

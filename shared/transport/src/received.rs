@@ -1,7 +1,7 @@
 //! Counts of the deliveries and losses of a sensor, in a file of the run's root: a source that
 //! replaces a dead one continues to count, and observers see the counts while the run works.
 
-use gyre_contract::control::Received;
+use gyre_contract::control::{RECEIVED, Received};
 
 use crate::{
     Manifest, RunError,
@@ -16,6 +16,6 @@ pub fn read(manifest: &Manifest) -> Option<Received> {
     numbers::read(&manifest.root.join(FILE)).map(Received::of_numbers)
 }
 
-pub fn open(manifest: &Manifest) -> Result<Numbers<9>, RunError> {
+pub fn open(manifest: &Manifest) -> Result<Numbers<RECEIVED>, RunError> {
     Numbers::open(manifest, FILE)
 }

@@ -16,7 +16,7 @@ mod kills;
 mod limits;
 mod results;
 mod scene;
-mod tools;
+pub mod tools;
 
 use std::env;
 

@@ -7,7 +7,6 @@ use std::{
 };
 
 use rand::Rng;
-use rustix::fs::{FallocateFlags, fallocate, statvfs};
 
 use super::{
     scene::{Scene, assert_one_sentence},
@@ -17,17 +16,6 @@ use crate::common::{OtherUser, Run, assert_nothing_left_of, can_mount};
 
 /// More than any results have.
 const PLENTY: u64 = 256 << 20;
-/// The file that fills a disk.
-const FILLER: &str = "filler";
-
-/// Leaves at most `leave` bytes of the file system at `place`.
-fn fill(place: &Path, leave: u64) {
-    let free = statvfs(place).unwrap();
-    let bytes = (free.f_bavail * free.f_frsize).saturating_sub(leave);
-    let filler = fs::File::create(place.join(FILLER)).unwrap();
-    // Fails if another process is faster.
-    let _ = fallocate(&filler, FallocateFlags::empty(), 0, bytes.max(1));
-}
 
 /// The disk is too small, or becomes full in the middle; then there is room again.
 pub fn the_disk_is_full(scene: &mut Scene) -> Option<()> {
@@ -45,13 +33,13 @@ pub fn the_disk_is_full(scene: &mut Scene) -> Option<()> {
     let mut running = run.start();
     if !small {
         scene.moment(&mut running)?;
-        fill(run.out(), scene.rng.random_range(0..64 << 10));
+        mount.fill(scene.rng.random_range(0..64 << 10));
         if scene.one_in(2) {
             scene.kill_stage(&running);
         }
     }
     let ended = running.finish();
-    let _ = fs::remove_file(run.out().join(FILLER));
+    mount.free();
     mount.remount(&format!("size={PLENTY}"));
     scene.survived(&run, &ended)
 }

@@ -6,7 +6,12 @@ use std::{
     process::Command,
 };
 
+use rustix::fs::{FallocateFlags, fallocate, statvfs};
+
 use crate::common::{Pid, processes::is_alive, works};
+
+/// The file that fills a disk.
+const FILLER: &str = "filler";
 
 /// Limits a resource of a process. That the process is gone already is no error.
 pub fn limit(pid: Pid, resource: &str, value: u64) {
@@ -36,6 +41,24 @@ impl Mount {
 
     pub fn remount(&self, options: &str) {
         self.mount(&["-o", &format!("remount,{options}")]);
+    }
+
+    /// Leaves at most `leave` bytes.
+    pub fn fill(&self, leave: u64) {
+        let filler = fs::File::create(self.0.join(FILLER)).unwrap();
+        loop {
+            let free = statvfs(&self.0).unwrap();
+            let bytes = (free.f_bavail * free.f_frsize).saturating_sub(leave);
+            let filled = filler.metadata().unwrap().len();
+            // Fails if another process is faster.
+            if bytes == 0 || fallocate(&filler, FallocateFlags::empty(), filled, bytes).is_ok() {
+                break;
+            }
+        }
+    }
+
+    pub fn free(&self) {
+        let _ = fs::remove_file(self.0.join(FILLER));
     }
 
     fn mount(&self, options: &[&str]) {

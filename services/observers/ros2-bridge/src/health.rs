@@ -171,6 +171,7 @@ mod tests {
             dropped,
             last_pose_s: Some(0.1),
             notice: None,
+            disk_is_full: false,
             swap: None,
             processes: vec![
                 process("masking", Activity::Working),

@@ -45,6 +45,9 @@ impl RunState {
 pub struct RunInfo {
     pub id: String,
     pub out: String,
+    /// The digest of the program, its beginning.
+    #[serde(skip)]
+    pub build: String,
     pub state: RunState,
     pub live: bool,
     /// Pace relative to the sensor's clock; none: as fast as it goes.
@@ -68,6 +71,8 @@ pub struct HealthReport {
     pub processes: Vec<Process>,
 }
 
+pub const OUTCOMES: usize = outcome::PREDICTED as usize + 1;
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RunCounts {
     pub published: u64,
@@ -78,6 +83,12 @@ pub struct RunCounts {
     pub missed: Missed,
     /// The basis of the motions, from the first of the run on.
     pub witnesses: WitnessCounts,
+    /// The motions by their outcome.
+    #[serde(skip)]
+    pub outcomes: [u64; OUTCOMES],
+    /// Time since the newest pose; 0 before the first one.
+    #[serde(skip)]
+    pub pose_age_s: f64,
     /// The samples of gyro and wheels, since this observer has come.
     pub samples: SampleHealth,
 }

@@ -1,7 +1,8 @@
 //! The metrics of the run, in the text format OpenMetrics.
 
-use std::fmt;
+use std::{fmt, path::Path};
 
+use gyre_client::free_bytes;
 use prometheus_client::{
     collector::Collector,
     encoding::{DescriptorEncoder, EncodeMetric, MetricEncoder, text::encode},
@@ -12,6 +13,7 @@ use prometheus_client::{
 use gyre_contract::{
     Basis, Witness,
     control::{Phase, Status},
+    outcome,
 };
 
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
@@ -22,6 +24,7 @@ pub const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; cha
 struct Snapshot {
     is_up: bool,
     status: Option<Status>,
+    free_bytes: u64,
     counts: RunCounts,
     processes: Vec<Process>,
 }
@@ -30,7 +33,8 @@ pub fn scrape(view: &RunView) -> String {
     let mut registry = Registry::with_prefix("gyre");
     let run = view.run();
     let version = env!("CARGO_PKG_VERSION").to_owned();
-    let labels = vec![("version", version), ("out", run.out)];
+    let out = run.out.clone();
+    let labels = vec![("version", version), ("build", run.build), ("out", run.out)];
     registry.register("run", "The run that is watched", Info::new(labels));
     registry.register_with_unit(
         "sensor_to_pose",
@@ -47,6 +51,7 @@ pub fn scrape(view: &RunView) -> String {
     registry.register_collector(Box::new(Snapshot {
         is_up: run.state.is_up(),
         status: view.status(),
+        free_bytes: free_bytes(Path::new(&out)).unwrap_or_default(),
         counts: view.counts(),
         processes: view.processes(),
     }));
@@ -105,6 +110,8 @@ impl Snapshot {
     #[rustfmt::skip]
     fn metrics(&self) -> Vec<Metric<'_>> {
         let (counts, of, missed) = (&self.counts, &self.counts.witnesses, &self.counts.missed);
+        let by_outcome = (0..).zip(self.counts.outcomes);
+        let by_outcome = by_outcome.map(|(code, count)| (outcome::name(code), count as f64));
         let by_basis = Basis::ALL.iter().zip(of.by_basis);
         let by_basis = by_basis.map(|(basis, count)| (basis.name(), count as f64));
         let by_kind = Witness::ALL.map(|kind| {
@@ -112,15 +119,20 @@ impl Snapshot {
             let states = [("used", of.used[kind as usize]), (refused, of.refused[kind as usize])];
             (name, help, None, COUNTER, by("state", states))
         });
-        let waits = self.status.as_ref().is_some_and(|it| it.phase == Phase::WaitingForRadar);
+        let status = self.status.as_ref();
+        let waits = status.is_some_and(|it| it.phase == Phase::WaitingForRadar);
         let mut metrics = vec![
             ("scans_published", "Scans that the source has published.", None, COUNTER, one(counts.published)),
             ("poses", "Poses of the trajectory.", None, COUNTER, one(counts.poses)),
             ("scans_dropped", "Scans that live mode has dropped.", None, COUNTER, one(counts.dropped)),
             ("up", "1 while a run works or waits for its radar, else 0.", None, GAUGE, one((self.is_up || waits).into())),
             ("waiting_for_radar", "1 while no azimuth arrives from the radar, else 0.", None, GAUGE, one(waits.into())),
+            ("disk_full", "1 while poses wait in memory for room on the disk, or are lost, else 0.", None, GAUGE, one(status.is_some_and(|it| it.disk_is_full).into())),
+            ("disk_free", "Room for the run on the disk of its folder.", Some(Unit::Bytes), GAUGE, one(self.free_bytes)),
+            ("pose_age", "Time since the newest pose; 0 before the first one, and when the stream has ended.", Some(Unit::Seconds), GAUGE, Values::One(counts.pose_age_s)),
             ("scans_in_flight", "Scans that were published and have no pose yet.", None, GAUGE, one(counts.in_flight)),
             ("motions", "Motions by what they rest on.", None, COUNTER, Values::By("basis", by_basis.collect())),
+            ("matches", "Motions by the outcome of their match with the map.", None, COUNTER, Values::By("outcome", by_outcome.collect())),
         ];
         metrics.extend(by_kind);
         metrics.extend([
@@ -143,7 +155,8 @@ impl Snapshot {
                 ("sample_rate", "Samples a second by their stamps, over the last scans.", Some(Unit::Other("hertz".to_owned())), GAUGE, rates),
             ]);
         }
-        if let Some(it) = self.processes.iter().find_map(|it| it.received) {
+        let received = self.processes.iter().find_map(|it| it.received);
+        if let Some(it) = received {
             metrics.extend([
                 ("radar_scans_left_out", "Turns of the radar of which there is no scan.", None, COUNTER, one(it.scans_left_out)),
                 ("radar_missing_azimuths", "Azimuths that are missing from the scans.", None, COUNTER, one(it.missing_azimuths)),
@@ -151,6 +164,13 @@ impl Snapshot {
                 ("radar_foreign_messages", "Datagrams of others, and descriptions that do not fit into the run.", None, COUNTER, one(it.foreign_messages)),
                 ("radar_reconnections", "Connections to the radar after the first.", None, COUNTER, one(it.reconnections())),
                 ("radar_receiving", "1 while azimuths arrive from the radar, else 0.", None, GAUGE, one(it.is_receiving.into())),
+            ]);
+        }
+        if let Some(clock) = received.and_then(|it| it.clock) {
+            metrics.extend([
+                ("radar_clock_steps", "How often the clock of the radar or of this host was set.", None, COUNTER, one(clock.steps)),
+                ("radar_clock_offset", "This host's time minus the radar's at the arrival of a scan, with the least delay of the network.", Some(Unit::Seconds), GAUGE, Values::One(clock.offset_ns as f64 * 1e-9)),
+                ("radar_clock_jitter", "How much later than that nine of ten scans arrive at most.", Some(Unit::Seconds), GAUGE, Values::One(clock.jitter_ns as f64 * 1e-9)),
             ]);
         }
         metrics
@@ -166,7 +186,9 @@ impl Snapshot {
 #[cfg(test)]
 mod tests {
     use gyre_contract::{
-        Hop, Item, PoseHeader, StageId, control::Received, flag, outcome, verdict,
+        Hop, Item, PoseHeader, StageId,
+        control::{Received, SensorClock},
+        flag, outcome, verdict,
     };
 
     use super::*;
@@ -190,15 +212,39 @@ mod tests {
     fn alarms_are_of_metrics_that_exist_and_one_is_of_a_run_that_has_ended() {
         let rules = include_str!("../../../../configs/prometheus/gyre.rules.yml");
         assert!(rules.contains("expr: gyre_up == 0\n"));
-        let text = scrape(&view());
+        let view = view();
+        let received = Received {
+            clock: Some(SensorClock::default()),
+            ..Received::default()
+        };
+        let text = scrape(&view) + &of_sensors(view.counts(), received);
         let words = rules.split(|c: char| !c.is_alphanumeric() && c != '_');
         for name in words.filter(|word| word.starts_with("gyre_")) {
             // A counter without a sample is named without its ending.
-            let family = name.trim_end_matches("_total").trim_end_matches("_bucket");
+            let family = ["_total", "_bucket", "_info"]
+                .iter()
+                .fold(name, |it, end| it.trim_end_matches(end));
             assert!(text.contains(&format!("# TYPE {family} ")), "{name}");
         }
         let delays = "gyre_hop_seconds_sum{stage=\"masking\",part=\"work\"} 0.003";
         assert!(text.contains(delays) && text.ends_with("# EOF\n"), "{text}");
+    }
+
+    #[test]
+    fn a_run_that_waits_for_its_radar_is_up_and_a_full_disk_is_shown() {
+        let view = view();
+        let status = Status {
+            phase: Phase::WaitingForRadar,
+            disk_is_full: true,
+            ..Status::default()
+        };
+        view.set_processes(&status, Vec::new());
+        let text = scrape(&view);
+        for name in ["gyre_up", "gyre_waiting_for_radar", "gyre_disk_full"] {
+            assert!(text.contains(&format!("\n{name} 1.0\n")), "{name}: {text}");
+        }
+        view.set_unknown();
+        assert!(scrape(&view).contains("\ngyre_up 0.0\n"));
     }
 
     /// The text of a run with a live radar and a gyro.
@@ -215,6 +261,7 @@ mod tests {
         registry.register_collector(Box::new(Snapshot {
             is_up: true,
             status: None,
+            free_bytes: 0,
             counts,
             processes: vec![source],
         }));
@@ -260,6 +307,11 @@ mod tests {
             scans_left_out: 5,
             connections: 8,
             is_receiving: true,
+            clock: Some(SensorClock {
+                offset_ns: -250_000_000,
+                jitter_ns: 500_000_000,
+                steps: 6,
+            }),
             ..Received::default()
         };
         let mut counts = view.counts();
@@ -280,6 +332,9 @@ mod tests {
             "gyre_radar_foreign_messages_total 0.0",
             "gyre_radar_reconnections_total 7.0",
             "gyre_radar_receiving 1.0",
+            "gyre_radar_clock_steps_total 6.0",
+            "gyre_radar_clock_offset_seconds -0.25",
+            "gyre_radar_clock_jitter_seconds 0.5",
             "gyre_samples_total{sensor=\"gyro\"} 2080.0",
             "gyre_samples_left_out_total 3.0",
             "gyre_sample_rate_hertz{sensor=\"gyro\"} 208.0",

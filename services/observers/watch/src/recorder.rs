@@ -18,9 +18,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_client::{MAX_WAIT, Manifest, Run, RunError, Signals, clock, log, run, wait_for_any};
+use gyre_client::{
+    MAX_WAIT, Manifest, Run, RunError, Signals, clock, has_room, log, run, wait_for_any,
+};
 use gyre_contract::{Message, Pose, Use, topic, topic_named};
-use gyre_recording::{LogTail, Positions, SplitWriter};
+use gyre_recording::{LogTail, Positions, RecordingError, SplitWriter};
 
 use begin::{begin, failed};
 use health::health;
@@ -117,9 +119,15 @@ pub fn record(options: &Options) -> Result<Recorded, RunError> {
     };
     let ended = recorder.run_until_end(&writing);
     let counts: Vec<Counts> = recorder.taps.iter().map(|tap| tap.counts()).collect();
-    drop(recorder);
+    let signals = recorder.signals;
+    drop(recorder.queue);
     let died = |_| RunError::Transient("the thread that writes the recording has ended".to_owned());
-    writing.join().map_err(died)?.map_err(failed)?;
+    match writing.join().map_err(died)? {
+        Err(error) if error.is_full() && options.continues => {
+            return Err(await_room(&path, error, &signals)?);
+        }
+        written => written.map_err(failed)?,
+    }
     ended?;
     let recorded = Recorded { path, counts };
     match recorded.is_complete() {
@@ -127,6 +135,20 @@ pub fn record(options: &Options) -> Result<Recorded, RunError> {
         false => tracing::error!("{recorded}"),
     }
     Ok(recorded)
+}
+
+/// Waits until the disk of a recording has room again; the recorder that is started then continues
+/// in the next file. Returns the error without room, when the run ends.
+fn await_room(path: &Path, error: RecordingError, signals: &Signals) -> Result<RunError, RunError> {
+    tracing::error!("{error}: the recording continues in a different file when there is room");
+    let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
+    while !has_room(folder.unwrap_or(Path::new("."))) {
+        if signals.sleep(MAX_WAIT)? {
+            return Ok(failed(error));
+        }
+    }
+    let again = "the disk of the recording was full, and has room again";
+    Ok(RunError::Transient(again.to_owned()))
 }
 
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, RunError> {

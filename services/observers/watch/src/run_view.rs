@@ -3,6 +3,7 @@
 use std::{
     collections::VecDeque,
     sync::{Mutex, MutexGuard, PoisonError},
+    time::Instant,
 };
 
 use axum::extract::ws::Message;
@@ -65,6 +66,8 @@ struct ViewState {
     /// The last poses, the newest at the end.
     poses: VecDeque<PoseHeader>,
     counts: RunCounts,
+    /// When the newest pose came.
+    newest: Option<Instant>,
     rates: SampleRates,
     /// Points that wait for the pose of their scan.
     pending: Option<(u64, PackedPoints)>,
@@ -106,6 +109,7 @@ impl RunView {
         self.update_run(|run| {
             run.id.clone_from(&manifest.prefix);
             run.out = manifest.out.display().to_string();
+            run.build = manifest.build.chars().take(12).collect();
             run.state = RunState::Working;
             run.live = manifest.live;
             run.rate = manifest.rate;
@@ -139,7 +143,11 @@ impl RunView {
         state.track.add(pose);
         state.drift.add(pose);
         if !pose.item.is(flag::BREAK) {
-            state.counts.witnesses.add(&pose.motion.refinement);
+            let record = &pose.motion.refinement;
+            state.counts.witnesses.add(record);
+            if let Some(count) = state.counts.outcomes.get_mut(record.outcome as usize) {
+                *count += 1;
+            }
         }
     }
 
@@ -153,6 +161,7 @@ impl RunView {
             return;
         }
         self.histograms.add(&pose.item);
+        state.newest = Some(Instant::now());
         state.poses.push_back(*pose);
         if state.poses.len() > MAX_POSES {
             state.poses.pop_front();
@@ -238,7 +247,14 @@ impl RunView {
     }
 
     pub fn counts(&self) -> RunCounts {
-        self.state().counts
+        let state = self.state();
+        let is_working = state.run.state == RunState::Working;
+        let newest = state.newest.filter(|_| is_working);
+        let age = newest.map(|newest| newest.elapsed());
+        RunCounts {
+            pose_age_s: age.unwrap_or_default().as_secs_f64(),
+            ..state.counts
+        }
     }
 
     pub fn report(&self) {

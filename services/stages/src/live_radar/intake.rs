@@ -7,13 +7,18 @@ use gyre_contract::{ScanHeader, control::Received};
 use gyre_datasets::DatasetOptions;
 use thiserror::Error;
 
-use crate::live_radar::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
+use crate::live_radar::{
+    clock_watch::ClockWatch,
+    scan_assembly::{Complete, ScanAssembly},
+    turn_counter::TurnCounter,
+};
 
 pub struct Intake {
     constants: DatasetOptions,
     /// `None` until the radar has sent its configuration.
     scans: Option<ScanAssembly>,
     turns: TurnCounter,
+    clock: ClockWatch,
     /// The counts since the start of the run, without the counts of turns and connections.
     counts: Received,
     due_ns: Option<i64>,
@@ -36,6 +41,7 @@ impl Intake {
             constants,
             scans: None,
             turns: TurnCounter::resume(None, 0),
+            clock: ClockWatch::default(),
             counts: Received::default(),
             due_ns: None,
         }
@@ -76,9 +82,17 @@ impl Intake {
         let scans = self.scans.as_mut();
         let scan =
             scans.and_then(|scans| scans.add(azimuth, arrival_ns, &mut self.turns, header, bytes));
-        if let Some((missing, due_ns)) = scan {
+        if let Some(Complete {
+            missing,
+            due_ns,
+            stamp_ns,
+        }) = scan
+        {
             self.counts.missing_azimuths += missing as u64;
             self.due_ns = due_ns;
+            if let Some(stamp_ns) = stamp_ns {
+                self.clock.add(stamp_ns, arrival_ns);
+            }
         }
         scan.is_some()
     }
@@ -108,6 +122,7 @@ impl Intake {
 
     pub fn resume(&mut self, before: Received) {
         self.turns = TurnCounter::resume(before.last_scan, before.scans_left_out);
+        self.clock = ClockWatch::resume(before.clock);
         self.counts = before;
     }
 
@@ -118,6 +133,7 @@ impl Intake {
         Received {
             scans_left_out: self.turns.left_out(is_open),
             last_scan: self.turns.last(),
+            clock: self.clock.state(),
             ..self.counts
         }
     }

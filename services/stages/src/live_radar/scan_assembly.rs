@@ -16,6 +16,16 @@ const BATCH: f64 = 10.0;
 /// The part of the azimuths up to the end of a turn: the radar may turn faster than configured.
 const BATCH_SHARE: f64 = 0.5;
 
+pub struct Complete {
+    /// Azimuths that are missing from the scan.
+    pub missing: usize,
+    /// The time of completion by the radar's clock, `CLOCK_MONOTONIC`, ns, where that is known.
+    pub due_ns: Option<i64>,
+    /// The stamp of its last azimuth, ns; `None` if the radar has no clock, or one of a different
+    /// pace than this host's.
+    pub stamp_ns: Option<i64>,
+}
+
 pub struct ScanAssembly {
     radar: Configuration,
     clock: RadarClock,
@@ -37,9 +47,7 @@ impl ScanAssembly {
         })
     }
 
-    /// Adds an azimuth with its time of arrival, ns since 1970. Returns, for a completed scan, its
-    /// missing azimuths and the time of completion by the radar's clock, `CLOCK_MONOTONIC`, ns,
-    /// where that is known.
+    /// Adds an azimuth with its time of arrival, ns since 1970; returns whether a scan is complete.
     pub fn add(
         &mut self,
         azimuth: Azimuth<'_>,
@@ -47,7 +55,7 @@ impl ScanAssembly {
         turns: &mut TurnCounter,
         header: &mut ScanHeader,
         bytes: &mut [u8],
-    ) -> Option<(usize, Option<i64>)> {
+    ) -> Option<Complete> {
         let at_ns = clock::now_ns();
         let mut complete = None;
         for (azimuth, stamp_ns) in self.clock.stamp(azimuth, arrival_ns) {
@@ -75,7 +83,11 @@ impl ScanAssembly {
             stamp_ns: sweep.geometry.stamp_ns,
             at_ns,
         });
-        Some((sweep.missing, due_ns))
+        Some(Complete {
+            missing: sweep.missing,
+            due_ns,
+            stamp_ns: due_ns.map(|_| last_ns),
+        })
     }
 
     fn due_ns(&mut self, last_ns: i64, at_ns: i64) -> Option<i64> {
@@ -162,7 +174,7 @@ mod tests {
             let azimuth = Azimuth::at(row * 14, stamp_ns, ClockFormat::default(), &[7; 16]);
             let (header, bytes) = (&mut self.header, &mut self.bytes);
             let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);
-            scan.map(|(missing, _)| missing)
+            scan.map(|it| it.missing)
         }
 
         /// Adds a turn, in whose middle the clock is set by `step_ns`.

@@ -88,6 +88,8 @@ gnss.kind=auto | gnss | set slam.kind to `graph`
 slam.kind=graph; gnss.kind=udp | gnss | kind is `udp` | no live radar | `auto`
 LIVE; slam.kind=graph; gnss.kind=ros2 | gnss | kind is `ros2` | "udp"
 LIVE; slam.kind=graph; gnss.kind=udp; gnss.listen=127.0.0.2:7; gyro.kind=udp; gyro.listen=127.0.0.2:7 | gnss | as that of gyro
+record.keep_mb=9 | [record]: keep_mb and keep_s remove whole files | split_mb
+record.split_mb=1; record.keep_s=-1.0 | keep_s is -1 | 0 or more
 budget.max_ms=-1.0 | [budget]: max_ms is -1 | 0 or more
 slam.map=a | [slam]: map is set | `graph`
 LIVE; source.address='' | address is missing

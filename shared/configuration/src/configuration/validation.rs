@@ -51,12 +51,17 @@ impl Configuration {
             ("source", "retry_s", source.retry_s),
             ("source", "silence_s", source.silence_s),
             ("record", "split_s", self.record.split_s),
+            ("record", "keep_s", self.record.keep_s),
         ] {
             let is_valid = number >= 0.0 && number.is_finite();
             if !is_valid {
                 let reason = format!("{key} is {number}, but must be 0 or more");
                 return Err(value(section, reason));
             }
+        }
+        if self.record.keeps_whole() {
+            let reason = "keep_mb and keep_s remove whole files: set split_mb or split_s too";
+            return Err(value("record", reason.to_owned()));
         }
         if let Some((key, time_s)) = source.faults.iter().find_map(PlayedFault::invalid) {
             let reason = format!("faults has {key} = {time_s}, but must have 0 or more");

@@ -29,6 +29,12 @@ impl RecordingError {
         Self::Io { path, source }
     }
 
+    /// Returns whether the disk is full.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        matches!(self, Self::Io { source, .. } if gyre_storage::is_full(source))
+    }
+
     pub(crate) fn damaged(path: &Path, offset: u64, reason: impl Display) -> Self {
         let path = path.display();
         Self::Damaged(format!("{path} is damaged at byte {offset}: {reason}"))

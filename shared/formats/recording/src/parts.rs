@@ -6,6 +6,7 @@ use std::{
     collections::BTreeSet,
     fs, io,
     path::{self, Path, PathBuf},
+    time::Duration,
 };
 
 use bytemuck::pod_read_unaligned;
@@ -102,6 +103,9 @@ pub struct Split {
     pub bytes: Option<u64>,
     /// Time from its first to its newest scan on the sensor's clock, ns; `None`: any.
     pub span_ns: Option<i64>,
+    /// The size of all files, and the age of the oldest one: older files are removed; `None`: any.
+    pub keep_bytes: Option<u64>,
+    pub keep_age: Option<Duration>,
 }
 
 pub struct SplitWriter {
@@ -141,7 +145,7 @@ impl SplitWriter {
 
     /// Adds a message, to the next part if this one is full.
     pub fn add(&mut self, message: &Incoming) -> Result<(), RecordingError> {
-        let Split { bytes, span_ns } = self.split;
+        let Split { bytes, span_ns, .. } = self.split;
         let is_full = bytes.is_some_and(|bytes| self.file.bytes() >= bytes)
             || span_ns.is_some_and(|span_ns| self.file.span_ns() >= span_ns);
         if is_full {
@@ -164,7 +168,35 @@ impl SplitWriter {
             ledger.note(&self.to, &self.head, &self.positions)?;
         }
         let next = part(&self.to, self.head.part);
-        self.file.go_on(&next, &self.head)
+        let ended = self.file.path.clone();
+        self.file.go_on(&next, &self.head)?;
+        self.remove_old(&ended)
+    }
+
+    /// Removes the oldest files, as if the file that is begun were as large as the one that has
+    /// ended.
+    fn remove_old(&self, ended: &Path) -> Result<(), RecordingError> {
+        let Split {
+            keep_bytes,
+            keep_age,
+            ..
+        } = self.split;
+        if keep_bytes.is_none() && keep_age.is_none() {
+            return Ok(());
+        }
+        let mut bytes = fs::metadata(ended).map_or(0, |it| it.len());
+        let older = parts(&self.to).into_iter().rev();
+        for path in older.filter(|it| *it != self.file.path) {
+            let file = fs::metadata(&path).map_err(|error| RecordingError::io(&path, error))?;
+            bytes += file.len();
+            let age = file.modified().ok().and_then(|it| it.elapsed().ok());
+            let is_old = keep_age.zip(age).is_some_and(|(keep, age)| age > keep);
+            let is_own = head(&path).is_some_and(|head| head.id == self.head.id);
+            if is_own && (is_old || keep_bytes.is_some_and(|keep| bytes > keep)) {
+                gyre_storage::remove(&path).map_err(|it| RecordingError::io(&path, it.source))?;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -147,8 +147,8 @@ fn a_part_is_as_long_as_it_is_to_be_although_poses_lag_behind_the_scans() {
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("drive.mcap");
     let split = Split {
-        bytes: None,
         span_ns: Some(750_000_000),
+        ..Split::default()
     };
     let mut writer =
         SplitWriter::create(to.clone(), head("a", 1), split, None, Positions::new()).unwrap();
@@ -177,7 +177,7 @@ fn a_part_ends_at_its_size_and_each_message_is_in_one_part() {
     let bytes = fs::metadata(&of_two).unwrap().len();
     let split = Split {
         bytes: Some(bytes),
-        span_ns: None,
+        ..Split::default()
     };
     let to = folder.path().join("drive.mcap");
     let mut writer =
@@ -204,6 +204,29 @@ fn a_part_ends_at_its_size_and_each_message_is_in_one_part() {
         let there = seqs(&alone, "scan").len() + seqs(&alone, "pose").len();
         assert_eq!(read_all(&mut alone), there);
     }
+}
+
+#[test]
+fn of_a_ring_of_parts_the_newest_are_kept_and_the_files_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("drive.mcap");
+    let other = folder.path().join("drive.2.mcap");
+    let other_part = RecordingWriter::create(&other, &head("b", 2)).unwrap();
+    other_part.finish().unwrap();
+    let split = Split {
+        span_ns: Some(250_000_000),
+        keep_bytes: Some(1),
+        ..Split::default()
+    };
+    let positions = Positions::new();
+    let mut writer = SplitWriter::create(to.clone(), head("a", 1), split, None, positions).unwrap();
+    for seq in 0..12 {
+        writer.add(&scan(seq)).unwrap();
+    }
+    let newest = writer.file.path.clone();
+    writer.file.finish().unwrap();
+    assert_eq!(gyre_recording::parts(&to), [other, newest.clone()]);
+    assert_eq!(seqs(&opened(&newest), "scan").last(), Some(&11));
 }
 
 /// A message of a generation that gives numbers from `numbered_from` on; `scan` distinguishes it

@@ -2,10 +2,11 @@
 //! observers. No stage waits for it, and it gives no credit. An event wakes it when a log has
 //! grown; as events can be lost, it looks every 200 ms.
 
-use gyre_transport::services::LogId;
 use std::{thread, time::Duration};
 
 use gyre_contract::{Header, Item, Message, run::StageCounters};
+use gyre_storage::{has_room, was_full};
+use gyre_transport::services::LogId;
 
 use crate::{Launch, counters::Work};
 pub use gyre_transport::transport::Notifier;
@@ -77,7 +78,11 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
             flow.output.accept_readers()?;
         }
         let slept = !limit.is_zero();
-        limit = match flow.step(follower)? {
+        let step = flow.step(follower);
+        if step.is_err() && was_full() {
+            await_room(launch)?;
+        }
+        limit = match step? {
             Step::Idle => wake::MAX_WAIT,
             Step::Worked(_) => Duration::ZERO,
             Step::Ended => return Ok(flow.counters),
@@ -86,6 +91,17 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
             flow.counters.wakes_caught_late += 1;
         }
     }
+}
+
+/// Waits until the full disk has room: the follower then begins again from its logs.
+fn await_room(launch: &Launch) -> Result<(), RunError> {
+    tracing::warn!("the disk is full: waiting for room");
+    while !has_room(&launch.manifest.out) {
+        if launch.signals.sleep(wake::MAX_WAIT)? {
+            return Err(RunError::Stopped);
+        }
+    }
+    Ok(())
 }
 
 struct Flow<M: Message> {

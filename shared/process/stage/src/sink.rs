@@ -18,6 +18,7 @@ use gyre_transport::{
 use crate::{Launch, counters::Work};
 
 const NOTICE: &str = "notice";
+const POSES_LOST: &str = "poses-lost";
 
 /// The owner of the trajectory.
 pub trait Sink {
@@ -92,6 +93,19 @@ pub fn notice(manifest: &Manifest) -> Option<String> {
 
 pub fn set_notice(manifest: &Manifest, notice: &str) -> Result<(), RunError> {
     run::write(manifest.root.join(NOTICE), notice)
+}
+
+/// Returns the error that poses are lost: the run is to begin again behind those in the journal.
+pub fn poses_lost(manifest: &Manifest, sentence: String) -> RunError {
+    match run::write(manifest.root.join(POSES_LOST), &sentence) {
+        Ok(()) => RunError::Input(sentence),
+        Err(error) => error,
+    }
+}
+
+/// Returns whether a run has ended with [`poses_lost`].
+pub fn has_lost_poses(manifest: &Manifest) -> bool {
+    manifest.root.join(POSES_LOST).exists()
 }
 
 /// Publishes the last poses again. The source resumes at the newest one, and masking needs the

@@ -6,7 +6,7 @@ use gyre_contract::{
     Command, Commands, StageId,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
 };
-use gyre_stage::{schedule, sink};
+use gyre_stage::schedule;
 use gyre_transport::{
     RunError, clock, received,
     wake::{MAX_WAIT, Signals},
@@ -278,7 +278,8 @@ impl Supervisor<'_> {
             poses: self.poses.count(),
             dropped: self.poses.dropped(),
             last_pose_s: self.poses.age_s(),
-            notice: sink::notice(manifest),
+            disk_is_full: self.notice.is_some(),
+            notice: self.notice.clone(),
             swap: self.swaps.pending(&self.processes, &self.run),
             processes,
         }

@@ -67,8 +67,8 @@ pub(crate) struct Supervisor<'a> {
     logs_due: Instant,
     /// True when all stages have opened their topics once.
     is_ready: bool,
-    /// True when a notice about the run was reported.
-    has_notice: bool,
+    /// The notice about the run that was reported last.
+    pub notice: Option<String>,
     // Last: the processes end before their guardian, and the ports before their node.
     pub run: Run<'a>,
 }
@@ -92,7 +92,7 @@ impl<'a> Supervisor<'a> {
             sweep_due: Instant::now() + PERIOD,
             logs_due: Instant::now(),
             is_ready: false,
-            has_notice: false,
+            notice: None,
             run,
         })
     }
@@ -188,11 +188,12 @@ impl<'a> Supervisor<'a> {
             self.logs_due = Instant::now() + PERIOD;
             log::bound_all(self.run.manifest());
         }
-        if !self.has_notice
-            && let Some(sentence) = sink::notice(self.run.manifest())
-        {
-            self.has_notice = true;
-            self.run.note(&sentence);
+        let notice = sink::notice(self.run.manifest());
+        if notice != self.notice {
+            let sentence = notice.as_deref();
+            let has_room = "the disk has room again, and has all poses";
+            self.run.note(sentence.unwrap_or(has_room));
+            self.notice = notice;
         }
         let standby = self.swaps.standby.iter().map(|it| it.child.pid());
         let others = standby.chain(self.recorder.as_ref().map(Recorder::pid));

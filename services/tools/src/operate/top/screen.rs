@@ -2,7 +2,7 @@
 
 use gyre_configuration::terminal::wrap;
 use gyre_contract::{
-    control::{Activity, ProcessStatus},
+    control::{Activity, ProcessStatus, SensorClock},
     run::latency::HopLatency,
 };
 use ratatui::{
@@ -119,7 +119,11 @@ fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
         .processes
         .iter()
         .filter_map(|it| it.received.as_ref());
-    let lacks: String = received.map(lacks).collect();
+    let lacks: String = received.clone().map(lacks).collect();
+    let clock: String = received
+        .filter_map(|it| it.clock.as_ref())
+        .map(clock)
+        .collect();
     let missed: u64 = status.processes.iter().filter_map(|it| it.missed).sum();
     let missed = match missed {
         0 => String::new(),
@@ -131,11 +135,28 @@ fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
     let lines = [
         status.out.display().to_string(),
         summary(status),
-        format!("{rate:.1} scans/s, {in_flight} in flight{missed}{lacks}"),
+        format!("{rate:.1} scans/s, {in_flight} in flight{missed}{lacks}{clock}"),
         format!("sensor to pose p50 {p50}, p99 {p99}, max {max} of {scans} poses in 10 s"),
         witnesses(snapshot),
     ];
     wrap(&lines.join("\n"), width.into())
+}
+
+/// Returns the clock of the radar against this host's, in words.
+fn clock(clock: &SensorClock) -> String {
+    let sign = if clock.offset_ns > 0 {
+        "behind"
+    } else {
+        "ahead"
+    };
+    let seconds = |ns: i64| duration(ns.unsigned_abs() as f64 * 1e-9);
+    let (offset, jitter) = (seconds(clock.offset_ns), seconds(clock.jitter_ns));
+    let steps = match clock.steps {
+        0 => String::new(),
+        1 => ", set once".to_owned(),
+        steps => format!(", set {steps} times"),
+    };
+    format!("  radar's clock {offset} {sign}, jitter {jitter}{steps}")
 }
 
 /// Returns the basis of the newest motion, how often gyro, wheels and Doppler were used, and the

@@ -4,7 +4,8 @@
 use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_contract::{
-    GnssHeader, Intake, IntakeHeader, NumberedBy, Scan, ScanHeader, StageId, control::Received,
+    GnssHeader, Intake, IntakeHeader, NumberedBy, Scan, ScanHeader, StageId,
+    control::{RECEIVED, Received},
     run::StageCounters,
 };
 use gyre_geometry::samples::{MAX_SAMPLES, Sample, SampleKind};
@@ -105,7 +106,7 @@ enum Wait {
 struct Stream<'a> {
     feed: Feed<'a, Scan>,
     intake: Writer<Intake>,
-    received: Numbers<9>,
+    received: Numbers<RECEIVED>,
     live: Option<LiveSensors>,
     /// `None`: the run predicts no poses.
     predictions: Option<Predictions>,
