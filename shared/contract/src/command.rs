@@ -261,7 +261,8 @@ impl Commands {
                     from_ns: Some(stamp_ns),
                 });
                 match appended {
-                    // A full disk ends no run: the time is known here, for as long as masking lives.
+                    // A full disk ends no run: the time is known here, for as long as masking
+                    // lives.
                     Err(CommandError::File { source, .. })
                         if source.kind() == io::ErrorKind::StorageFull =>
                     {
