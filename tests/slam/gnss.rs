@@ -6,7 +6,10 @@ use std::{fs, path::PathBuf};
 use gyre_datasets::read_trajectory;
 use gyre_geometry::samples::{Geographic, LocalPlane};
 use gyre_radar::Trajectory;
-use gyre_slam::mapping::{Map, Origin};
+use gyre_slam::{
+    estimation::G2o,
+    mapping::{Map, Origin},
+};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::Value;
 
@@ -17,6 +20,8 @@ use crate::{
     },
     live::gnss::assert_replays,
     observers::record::{WINDOW, recorded},
+    reach::{only_if, python_has},
+    slam::loops::by_gtsam,
 };
 
 /// Where the world of the simulation lies.
@@ -136,6 +141,17 @@ fn odometry_is_the_same_and_the_map_lies_where_the_fixes_say() {
     assert_eq!(drawn.origin(), Some(origin(&run)));
     assert_eq!(Map::open(&draw(&without)).unwrap().origin(), None);
     assert!(without.summary().get("gnss").is_none());
+}
+
+#[test]
+fn the_optimum_of_gtsam_has_the_same_poses_with_fixes() {
+    only_if!(python_has("gtsam"));
+    let run = run();
+    run.complete();
+    let [edges, _, _, _, _, apart_m] = by_gtsam(&run);
+    let without_fixes = G2o::parse(&run.result("graph.g2o")).unwrap();
+    assert!(edges > without_fixes.constraints.len() as f64 + 60.0);
+    assert!(apart_m < 0.02, "{apart_m}");
 }
 
 #[test]

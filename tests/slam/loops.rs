@@ -51,30 +51,29 @@ fn a_drive_that_comes_back_is_corrected_by_loops() {
     }
 }
 
-#[test]
-fn gtsam_reads_all_of_a_graph() {
-    only_if!(python_has("gtsam"));
-    let run = corrected();
+/// GTSAM's reading of the graph of a run: edges, poses, the last pose, and by how much poses are
+/// from its optimum at most, m.
+pub fn by_gtsam(run: &Run) -> [f64; 6] {
     let mut command = script("slam/g2o.py");
     command.arg(run.out().join("graph.g2o"));
     let read = Ended::of(command);
     read.succeeded();
-    let read: Vec<f64> = read
-        .stdout
-        .split_whitespace()
-        .map(|number| number.parse().unwrap())
-        .collect();
+    let numbers = read.stdout.split_whitespace();
+    let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
+    numbers.try_into().unwrap()
+}
+
+#[test]
+fn gtsam_reads_all_of_a_graph_and_its_optimum_has_the_same_poses() {
+    only_if!(python_has("gtsam"));
+    let run = corrected();
+    let [edges, poses, x, y, yaw, apart_m] = by_gtsam(&run);
     let graph = G2o::parse(&run.result("graph.g2o")).unwrap();
-    let [x, y, yaw] = xy_yaw(&graph.poses[graph.poses.len() - 1]);
-    let expected = [
-        graph.constraints.len() as f64,
-        graph.poses.len() as f64,
-        x,
-        y,
-        yaw,
-    ];
-    for (read, expected) in read.iter().zip(expected) {
+    let counts = [graph.constraints.len(), graph.poses.len()];
+    assert_eq!([edges, poses], counts.map(|count| count as f64));
+    let expected = xy_yaw(&graph.poses[graph.poses.len() - 1]);
+    for (read, expected) in [x, y, yaw].iter().zip(expected) {
         assert!((read - expected).abs() < 1e-9, "{read} for {expected}");
     }
-    assert_eq!(read.len(), expected.len());
+    assert!(apart_m < 0.02, "{apart_m}");
 }

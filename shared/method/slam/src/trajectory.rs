@@ -1,3 +1,5 @@
+mod exchange;
+
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::Matrix3;
 
@@ -264,7 +266,7 @@ impl TrajectoryEstimator {
         &self.loops
     }
 
-    pub fn odometry(&self) -> impl Iterator<Item = Constraint> + '_ {
+    fn odometry(&self) -> impl Iterator<Item = Constraint> + '_ {
         let motions = self.keyframes.iter().skip(1).enumerate();
         motions.map(|(last, keyframe)| Constraint::odometry(last, keyframe.motion))
     }

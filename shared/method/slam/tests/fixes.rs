@@ -2,11 +2,14 @@
 //! they came.
 
 use gyre_geometry::{
-    Pose, interpolate, pose,
+    Pose, UncertainMotion, interpolate, pose,
     samples::{GnssConfig, GnssFix},
 };
-use gyre_slam::{EstimatorKind, FixRefusal, Fixes, Keyframe, TrajectoryEstimator};
-use nalgebra::Point2;
+use gyre_slam::{
+    EstimatorKind, FixRefusal, Fixes, Keyframe, TrajectoryEstimator,
+    estimation::{Constraint, G2o, GraphOptions, Kernel, PoseGraph},
+};
+use nalgebra::{Matrix3, Point2};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -323,4 +326,61 @@ fn a_fix_that_is_taken_stays_however_late_the_fixes_are() {
         before = taken;
     }
     assert!(before.len() > 250, "{}", before.len());
+}
+
+/// Returns the solution of all edges of a file by plain least squares.
+fn plain(edges: &G2o) -> Vec<Pose> {
+    let options = GraphOptions {
+        gate: f64::INFINITY,
+        kernel: Kernel::None,
+        tolerance: 1e-12,
+        ..GraphOptions::default()
+    };
+    let mut graph = PoseGraph::new(edges.poses[0], options);
+    for constraint in &edges.constraints {
+        graph.apply(constraint).unwrap();
+    }
+    graph.solve().unwrap();
+    graph.poses().to_vec()
+}
+
+/// Loops of which groups are dependent and some are wrong by decimetres, fixes with a reflection.
+#[test]
+fn plain_least_squares_of_the_g2o_file_finds_the_same_poses() {
+    let drive = Drive::new(600, 13);
+    let mut fixes = drive.fixes(14);
+    for fix in fixes.iter_mut().filter(|it| is_reflected(it.stamp_ns)) {
+        fix.east_m += 3.0;
+    }
+    let mut estimator = drive.with(fixes);
+    for keyframe in &drive.keyframes {
+        estimator.push(keyframe).unwrap();
+    }
+    for k in 0..60 {
+        let [from, to] = [40 + k, 400 + k];
+        let off_m = if k % 5 == 4 { 0.3 } else { 0.02 };
+        let motion = UncertainMotion {
+            motion: drive.truth[from].inv_mul(&drive.truth[to]) * pose(off_m, 0.0, 0.001),
+            covariance: 0.01 * Matrix3::from_diagonal(&[1.0, 1.0, 0.01].into()),
+        };
+        let closing = Constraint::closing(from, to, motion);
+        estimator.close_loop(&closing).unwrap();
+    }
+    estimator.solve().unwrap();
+    let text = estimator.g2o();
+    let (edges, comments) = text.split_once("FIX 0\n").unwrap();
+    let kernel = "# robust kernel: dynamic covariance scaling, phi 4.0665.";
+    assert!(comments.starts_with(kernel), "{comments}");
+    // Without the comments the fixes are read as loops.
+    let all = G2o::parse(edges).unwrap();
+    let without_fixes = G2o::parse(&text).unwrap();
+    assert_eq!(without_fixes.constraints.len(), 599 + 60);
+    assert!(all.constraints.len() > 599 + 60 + 400);
+    let apart_m = |a: &[Pose]| {
+        let pairs = a.iter().zip(estimator.poses());
+        let apart = pairs.map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
+        apart.fold(0.0, f64::max)
+    };
+    assert!(apart_m(&plain(&all)) < 2e-3, "{}", apart_m(&plain(&all)));
+    assert!(apart_m(&plain(&without_fixes)) > 0.1);
 }

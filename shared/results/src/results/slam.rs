@@ -15,7 +15,7 @@ use gyre_radar::Trajectory;
 use gyre_slam::{
     Correction, Fixes, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader,
     TrajectoryEstimator,
-    estimation::{Constraint, EstimationError, G2o},
+    estimation::{Constraint, EstimationError},
     records_path,
 };
 
@@ -142,11 +142,10 @@ impl Slam {
         Ok(rows)
     }
 
-    /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that
-    /// are used.
+    /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops and
+    /// fixes that are used.
     pub fn graph_g2o(&self) -> String {
-        let constraints = self.estimator.odometry().chain(self.used());
-        G2o::write(self.estimator.poses(), constraints)
+        self.estimator.g2o()
     }
 
     /// Returns what became of the fixes of GNSS, and the place on the earth; `None` without them.

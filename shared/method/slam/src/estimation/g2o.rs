@@ -1,4 +1,4 @@
-//! Pose graphs as g2o files: `VERTEX_SE2`, `EDGE_SE2` and `FIX` of the first vertex.
+//! Pose graphs as g2o files: `VERTEX_SE2`, `EDGE_SE2`, `FIX` of the first vertex, and comments.
 //!
 //! The error of a g2o edge lies along the axes of the keyframe `to` as measured, with an
 //! information matrix; the error of a [`Constraint`] along the axes of `from`, with a covariance.
@@ -30,15 +30,24 @@ pub struct G2o {
 pub struct G2oError(String);
 
 impl G2o {
+    /// The beginning of the comment with the number of the fixes of GNSS.
+    pub const FIXES: &str = "# fixes";
+
     /// Reads a file with the vertices in the order of their ids, from 0, and edges after them. The
-    /// first edge from each keyframe to the next one is odometry; all others are independent loops.
+    /// first edge from each keyframe to the next one is odometry; all others are independent loops,
+    /// but for the last ones if a comment states that these are fixes, which are left out.
     pub fn parse(text: &str) -> Result<Self, G2oError> {
         let (mut poses, mut odometry, mut loops) = (Vec::new(), Vec::new(), Vec::new());
         for (line, text) in (1..).zip(text.lines()) {
             let at = |reason: String| G2oError(format!("line {line}: {reason}"));
+            if let Some(fixes) = text.strip_prefix(Self::FIXES) {
+                let left = fixes_before(fixes, loops.len()).map_err(at)?;
+                loops.truncate(left);
+            }
             let mut words = text.split_whitespace();
             match words.next() {
                 None | Some("FIX") => {}
+                Some(comment) if comment.starts_with('#') => {}
                 Some("VERTEX_SE2") => {
                     let needed = "VERTEX_SE2 needs an id, x, y and yaw";
                     let ([id], [x, y, yaw]) = fields(words, needed).map_err(at)?;
@@ -109,6 +118,13 @@ impl G2o {
 fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{content}");
+}
+
+/// Returns the number of loops without the fixes that a comment counts.
+fn fixes_before(comment: &str, loops: usize) -> Result<usize, String> {
+    let count = comment.split(':').next().unwrap_or_default().trim();
+    let left = count.parse().ok().and_then(|it| loops.checked_sub(it));
+    left.ok_or_else(|| format!("{loops} edges that are no odometry are before {count:?} fixes"))
 }
 
 /// Returns the matrix that turns (x, y, yaw) along the axes of the keyframe `to` into (x, y, yaw)

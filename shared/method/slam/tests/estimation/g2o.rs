@@ -90,6 +90,10 @@ fn files_that_are_no_plane_pose_graph_are_refused_with_line_and_reason() {
             "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1",
             "there is no edge from vertex 1 to the next one, 2",
         ),
+        (
+            "# fixes 1: of another file",
+            "line 4: 0 edges that are no odometry are before \"1\" fixes",
+        ),
     ] {
         let error: G2oError = G2o::parse(&format!("{vertices}{line}\n")).unwrap_err();
         assert!(error.to_string().starts_with(reason), "{error}");
