@@ -6,8 +6,8 @@ use gyre_transport::RunError;
 
 pub struct AppliedCommands {
     commands: Commands,
-    /// The item that was marked last, as it was marked.
-    last: Option<Item>,
+    /// The number of commands that applied to the last scan.
+    last: Option<u64>,
 }
 
 impl AppliedCommands {
@@ -19,15 +19,12 @@ impl AppliedCommands {
     }
 
     /// Writes the number of commands that apply to a scan into its item, and starts a chain of
-    /// motions there if one of them is new and resets the run. `resume_at` is the item of the
-    /// newest pose at the last start of the sink: nothing of it or of earlier scans changes any
-    /// more.
+    /// motions there if one of them is new and resets the run; once for each scan that is
+    /// processed. `resume_at` is the item of the newest pose at the last start of the sink: nothing
+    /// of it or of earlier scans changes any more.
     pub fn mark(&mut self, item: &Item, resume_at: &Item) -> Result<Item, RunError> {
-        if let Some(last) = self.last.filter(|last| last.seq == item.seq) {
-            return Ok(last);
-        }
         let is_old = !resume_at.is(flag::BASE) && item.seq <= resume_at.seq;
-        let before = self.last.map_or(resume_at.commands, |last| last.commands);
+        let before = self.last.unwrap_or(resume_at.commands);
         let apply = match is_old {
             true => resume_at.commands,
             false => {
@@ -44,7 +41,7 @@ impl AppliedCommands {
             marked.flags |= flag::BREAK;
             marked.previous_scan = marked.scan;
         }
-        self.last = Some(marked);
+        self.last = Some(apply);
         Ok(marked)
     }
 }
@@ -83,11 +80,11 @@ mod tests {
         given.add(reset).unwrap();
         for masking in [&mut first, &mut AppliedCommands::new(open())] {
             let mut marked = |seq| masking.mark(&item(seq), &item(3).with_commands(1)).unwrap();
-            let states = [4, 4, 5].map(|seq| {
+            let states = [4, 5].map(|seq| {
                 let it = marked(seq);
                 (it.commands, it.is(flag::BREAK), it.previous_scan)
             });
-            assert_eq!(states, [(2, true, 4), (2, true, 4), (2, false, 4)]);
+            assert_eq!(states, [(2, true, 4), (2, false, 4)]);
         }
         // The newest pose is of the scan with the reset.
         let mut resumed = AppliedCommands::new(open());

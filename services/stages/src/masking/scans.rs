@@ -83,10 +83,13 @@ impl Inputs for Scans {
         let action = self.queue.next_action(&resume_at, newest_pose)?;
         match action {
             Action::Process(item, received_ns) => {
-                let item = self.commands.mark(&item, &resume_at)?;
                 if !self.find_motions(&item) {
                     return Ok(Action::Wait);
                 }
+                // Now it is certain that this scan is processed: in live mode a newer one takes the
+                // place of one that waits. Where a chain starts, all motions are known.
+                let item = self.commands.mark(&item, &resume_at)?;
+                self.find_motions(&item);
                 self.starts_chain = item.is(flag::BREAK);
                 self.take_samples()?;
                 return Ok(Action::Process(item, received_ns));
