@@ -217,8 +217,11 @@ impl File {
         Ok(())
     }
 
-    /// Cuts the file, or extends it by zeros.
+    /// Cuts the file, or extends it by zeros. Writes that wait behind its new end are dropped.
     pub fn set_length(&self, length: u64) -> Result<(), StorageError> {
+        if let Some(mut held) = self.held() {
+            held.cut(length);
+        }
         let set = self.file.set_len(length);
         set.map_err(StorageError::at("write", &self.path))?;
         #[cfg(feature = "record")]

@@ -125,6 +125,13 @@ impl Held {
         self.remove(0);
     }
 
+    /// Drops the writes behind the end of a file that is cut to this length.
+    pub fn cut(&mut self, length: u64) {
+        while let Some(behind) = self.writes.iter().position(|(at, _)| *at >= length) {
+            self.remove(behind);
+        }
+    }
+
     fn remove(&mut self, index: usize) {
         if let Some((_, bytes)) = self.writes.remove(index) {
             HELD.fetch_sub(bytes.len(), Ordering::Relaxed);
@@ -134,8 +141,6 @@ impl Held {
 
 impl Drop for Held {
     fn drop(&mut self) {
-        while !self.is_empty() {
-            self.pop();
-        }
+        self.cut(0);
     }
 }

@@ -68,6 +68,13 @@ fn writes_to_a_full_disk_are_made_in_their_order_when_there_is_room_again() {
 
     let length = records_path::<Bytes>(out.path()).metadata().unwrap().len();
     limit(Some(length));
+    log.append(&record(101, 400)).unwrap();
+    log.cut(50).unwrap();
+    log.append(&record(50, 400)).unwrap();
+    log.sync().unwrap();
+    let expected: Vec<u8> = (0..=50).collect();
+    assert_eq!(numbers(&out), expected, "what waits is cut off too");
+    (51..=100).for_each(|number| log.append(&record(number, 400)).unwrap());
     (101..=108).for_each(|number| log.append(&record(number, 10 << 20)).unwrap());
     assert_eq!(disk(), Disk::Lost(false), "memory has its limit too");
     limit(None);

@@ -42,8 +42,8 @@ impl Generation {
         let text: String = kept.map(Line::to_string).collect();
         gyre_storage::create_folder(&manifest.out.join("journal"))?;
         match gyre_storage::write(&path, text) {
-            // The line has room behind the others.
-            Err(error) if error.is_full() => append(&path, lines.last())?,
+            // The line may have room behind the others.
+            Err(error) if error.is_full() && newest.is_some() => append(&path, lines.last())?,
             written => written?,
         }
         Ok(Self(GivenAnew { generation, first }))
@@ -81,7 +81,12 @@ pub fn skipped(
 fn append(path: &Path, line: Option<&Line>) -> Result<(), RunError> {
     let file = gyre_storage::File::open_or_create(path)?;
     let text = line.map(Line::to_string).unwrap_or_default();
-    file.write_at(text.as_bytes(), file.length()?)?;
+    let end = file.length()?;
+    file.write_at(text.as_bytes(), end).or_else(|error| {
+        // A part of a line would make the file invalid.
+        file.set_length(end)?;
+        Err(error)
+    })?;
     Ok(file.sync()?)
 }
 

@@ -79,8 +79,11 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
         }
         let slept = !limit.is_zero();
         let step = flow.step(follower);
-        if step.is_err() && was_full() {
+        if let Err(error) = &step
+            && was_full()
+        {
             await_room(launch)?;
+            return Err(RunError::Transient(error.to_string()));
         }
         limit = match step? {
             Step::Idle => wake::MAX_WAIT,
@@ -93,7 +96,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     }
 }
 
-/// Waits until the full disk has room: the follower then begins again from its logs.
+/// Waits until the full disk has room: the follower is then started again, from its logs.
 fn await_room(launch: &Launch) -> Result<(), RunError> {
     tracing::warn!("the disk is full: waiting for room");
     while !has_room(&launch.manifest.out) {
