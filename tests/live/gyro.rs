@@ -99,7 +99,7 @@ fn a_live_gyro_and_wheels_give_the_motions_of_their_logs_and_the_recording_repla
 #[test]
 fn between_the_scans_poses_are_predicted_at_their_rate_and_lead_to_the_next_pose() {
     let whole = with_log();
-    let listen = address(3);
+    let listen = address(5);
     let radar = Radar::playing(whole.path(), &[]);
     let run = radar.run(SCANS).sets(&format!(
         "gyro.kind=udp gyro.listen='{listen}' run.window=32 run.predict_hz=50"

@@ -31,6 +31,7 @@ fn a_reset_begins_at_its_pose_and_is_repeated_by_a_replay_and_after_kills() {
         .succeeded()
         .prints("the run is reset from the scan of");
     running.kill("pose-integration").kill("masking");
+    running.await_poses(10);
     finished!["reset", run.out(), "--pose=-3,0,0"].succeeded();
     running.kill("masking").kill("loop-closure");
     running.finish().succeeded();

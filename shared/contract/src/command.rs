@@ -250,10 +250,11 @@ impl Commands {
     }
 
     /// Returns the number of commands that apply to a scan. Those that have no time yet apply from
-    /// this scan on.
-    pub fn apply(&mut self, stamp_ns: i64) -> Result<u64, CommandError> {
+    /// a scan on that nobody has received.
+    pub fn apply(&mut self, stamp_ns: i64, is_unseen: bool) -> Result<u64, CommandError> {
         self.refresh()?;
-        for number in 1..=self.len() {
+        let undecided = if is_unseen { 1..=self.len() } else { 1..=0 };
+        for number in undecided {
             if self.from_ns(number).is_none() {
                 let appended = self.append(&Line {
                     number,
@@ -365,12 +366,13 @@ mod tests {
         let folder = folder();
         let [mut supervisor, mut masking] =
             [(); 2].map(|()| Commands::open(folder.path()).unwrap());
-        assert_eq!(masking.apply(100).unwrap(), 0);
+        assert_eq!(masking.apply(100, true).unwrap(), 0);
         assert_eq!(supervisor.add(RESET).unwrap(), 1);
-        assert_eq!(masking.apply(200).unwrap(), 1);
+        assert_eq!(masking.apply(150, false).unwrap(), 0);
+        assert_eq!(masking.apply(200, true).unwrap(), 1);
         let mut restarted = Commands::open(folder.path()).unwrap();
         assert_eq!(
-            [100, 199, 200].map(|ns| restarted.apply(ns).unwrap()),
+            [100, 199, 200].map(|ns| restarted.apply(ns, true).unwrap()),
             [0, 0, 1]
         );
         supervisor.refresh().unwrap();

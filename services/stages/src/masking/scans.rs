@@ -60,7 +60,7 @@ impl Inputs for Scans {
         let commands = Commands::open(&launch.manifest.out).map_err(RunError::input)?;
         Ok(Self {
             queue,
-            commands: AppliedCommands::new(commands),
+            commands: AppliedCommands::new(commands, launch.manifest.window.scans),
             starts_chain: false,
             motions,
             sensors: SampledSensors::new(&launch.sensors()?),
