@@ -90,7 +90,8 @@ impl Inputs for Scans {
                 // place of one that waits. Where a chain starts, all motions are known.
                 let item = self.commands.mark(&item, &resume_at)?;
                 self.find_motions(&item);
-                self.starts_chain = item.is(flag::BREAK);
+                // A restarted masking knows from the poses where a reset was.
+                self.starts_chain = self.motions.known.starts(item.seq);
                 self.take_samples()?;
                 return Ok(Action::Process(item, received_ns));
             }
