@@ -249,12 +249,12 @@ impl Commands {
         Ok(number)
     }
 
-    /// Returns the number of commands that apply to a scan. Those that have no time yet apply from
-    /// this scan on.
-    pub fn apply(&mut self, stamp_ns: i64) -> Result<u64, CommandError> {
+    /// Returns the number of commands that apply to a scan. If it takes new commands, those that
+    /// have no time yet apply from this scan on.
+    pub fn apply(&mut self, stamp_ns: i64, takes_new: bool) -> Result<u64, CommandError> {
         self.refresh()?;
         for number in 1..=self.len() {
-            if self.from_ns(number).is_none() {
+            if takes_new && self.from_ns(number).is_none() {
                 let appended = self.append(&Line {
                     number,
                     command: None,
@@ -364,12 +364,12 @@ mod tests {
         let folder = folder();
         let [mut supervisor, mut masking] =
             [(); 2].map(|()| Commands::open(folder.path()).unwrap());
-        assert_eq!(masking.apply(100).unwrap(), 0);
+        assert_eq!(masking.apply(100, true).unwrap(), 0);
         assert_eq!(supervisor.add(RESET).unwrap(), 1);
-        assert_eq!(masking.apply(200).unwrap(), 1);
+        assert_eq!(masking.apply(200, true).unwrap(), 1);
         let mut restarted = Commands::open(folder.path()).unwrap();
         assert_eq!(
-            [100, 199, 200].map(|ns| restarted.apply(ns).unwrap()),
+            [100, 199, 200].map(|ns| restarted.apply(ns, true).unwrap()),
             [0, 0, 1]
         );
         supervisor.refresh().unwrap();

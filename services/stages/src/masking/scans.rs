@@ -60,7 +60,10 @@ impl Inputs for Scans {
         let commands = Commands::open(&launch.manifest.out).map_err(RunError::input)?;
         Ok(Self {
             queue,
-            commands: AppliedCommands::new(commands),
+            commands: AppliedCommands::new(
+                commands,
+                (!launch.manifest.live).then_some(launch.manifest.window),
+            ),
             starts_chain: false,
             motions,
             sensors: SampledSensors::new(&launch.sensors()?),

@@ -206,7 +206,7 @@ mod tests {
             }
             let mut commands = Commands::open(out).unwrap();
             commands.add(reset(false)).unwrap();
-            commands.apply(4).unwrap();
+            commands.apply(4, true).unwrap();
             keyframes.obey(&reset(false)).unwrap();
             keyframes.add(&pose(4, 1), &[]).unwrap();
             if journalled > 4 {
