@@ -9,7 +9,7 @@
 
 use std::{
     fs::{self, OpenOptions},
-    io::{self, Write},
+    io::{self, Seek, Write},
     mem,
     path::{Path, PathBuf},
 };
@@ -262,9 +262,7 @@ impl Commands {
                 });
                 match appended {
                     // A full disk ends no run: the time is known here, for as long as masking lives.
-                    Err(CommandError::File { source, .. })
-                        if source.kind() == io::ErrorKind::StorageFull =>
-                    {
+                    Err(CommandError::File { source, .. }) if gyre_storage::is_full(&source) => {
                         self.given[number as usize - 1].1 = Some(stamp_ns);
                     }
                     appended => appended?,
@@ -283,18 +281,38 @@ impl Commands {
     fn append(&mut self, line: &Line) -> Result<(), CommandError> {
         let mut text = serde_json::to_string(line).map_err(|error| self.failed(error.into()))?;
         text.push('\n');
-        let mut options = OpenOptions::new();
-        let mut file = options
-            .create(true)
-            .append(true)
-            .open(&self.path)
-            .map_err(|error| self.failed(error))?;
-        // One write, since two processes append.
-        let written = file.write_all(text.as_bytes());
-        written
-            .and_then(|()| file.sync_data())
+        self.append_text(&text)
             .map_err(|error| self.failed(error))?;
         self.refresh()
+    }
+
+    fn append_text(&self, text: &str) -> io::Result<()> {
+        let mut options = OpenOptions::new();
+        let mut file = options.create(true).append(true).open(&self.path)?;
+        // One write, since two processes append.
+        let written = file.write(text.as_bytes())?;
+        if written < text.len() {
+            // The next line must not continue the part that a full disk has taken.
+            let end = file.stream_position()?;
+            file.set_len(end - written as u64)?;
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        file.sync_data()
+    }
+
+    /// Cuts off a line that a power failure has cut short, which the next one would continue.
+    /// Before the processes of the run begin.
+    pub fn cut_torn(out: &Path) -> Result<(), CommandError> {
+        let commands = Self::open(out)?;
+        let cut = |path: &Path| {
+            let file = OpenOptions::new().write(true).open(path)?;
+            file.set_len(commands.read_bytes)?;
+            file.sync_data()
+        };
+        match cut(&commands.path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            cut => cut.map_err(|error| commands.failed(error)),
+        }
     }
 
     fn failed(&self, source: io::Error) -> CommandError {
@@ -388,6 +406,8 @@ mod tests {
         fs::write(&path, format!("{whole}{{\"number\":1,\"fr")).unwrap();
         commands.refresh().unwrap();
         assert_eq!(commands.from_ns(1), None);
+        Commands::cut_torn(folder.path()).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), whole);
         fs::write(&path, format!("{whole}{{\"number\":1,\"from_ns\":7}}\n")).unwrap();
         commands.refresh().unwrap();
         assert_eq!(commands.from_ns(1), Some(7));
