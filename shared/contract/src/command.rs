@@ -272,10 +272,12 @@ impl Commands {
         Ok(self.applied(stamp_ns))
     }
 
-    /// Returns the number of commands whose times are up to the time of a scan.
+    /// Returns the number of commands up to the last one whose time is up to the time of a scan:
+    /// where the sensor's clock has stepped back, those before have later times.
     pub fn applied(&self, stamp_ns: i64) -> u64 {
-        let apply = |given: &&(Command, Option<i64>)| given.1.is_some_and(|ns| ns <= stamp_ns);
-        self.given.iter().take_while(apply).count() as u64
+        let applies = |given: &(Command, Option<i64>)| given.1.is_some_and(|ns| ns <= stamp_ns);
+        let last = self.given.iter().rposition(applies);
+        last.map_or(0, |index| index as u64 + 1)
     }
 
     fn append(&mut self, line: &Line) -> Result<(), CommandError> {
@@ -394,6 +396,9 @@ mod tests {
         assert_eq!(supervisor.from_ns(1), Some(200));
         assert_eq!(supervisor.between(0, 1).collect::<Vec<_>>(), [&RESET]);
         assert_eq!(supervisor.between(1, 1).count(), 0);
+        // The clock steps back.
+        supervisor.add(RESET).unwrap();
+        assert_eq!(masking.apply(150, true).unwrap(), 2);
     }
 
     #[test]
