@@ -420,12 +420,13 @@ pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
     Ok(replaced::remove(out)?)
 }
 
-/// Prepares the folder for a resumed run: cuts off the remains of the last poses after a power
-/// failure, and writes `config.toml` again if it differs from the run's first configuration.
+/// Prepares the folder for a resumed run: cuts off the remains of the last poses and commands after
+/// a power failure, and writes `config.toml` again if it differs from the run's first configuration.
 pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
     if begun.lost > 0 {
         journal::cut(out.path(), begun.poses)?;
     }
+    Commands::cut_torn(out.path())?;
     let (path, identity) = (out.join(CONFIGURATION), &begun.identity);
     let found = storage::read_text(&path, storage::SETTINGS).ok();
     let found: Option<toml::Table> = found.and_then(|text| text.parse().ok());

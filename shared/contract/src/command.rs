@@ -9,7 +9,7 @@
 
 use std::{
     fs::{self, OpenOptions},
-    io::{self, Write},
+    io::{self, Seek, Write},
     mem,
     path::{Path, PathBuf},
 };
@@ -249,24 +249,20 @@ impl Commands {
         Ok(number)
     }
 
-    /// Returns the number of commands that apply to a scan. Those that have no time yet apply from
-    /// a scan on that nobody has received.
-    pub fn apply(&mut self, stamp_ns: i64, is_unseen: bool) -> Result<u64, CommandError> {
+    /// Returns the number of commands that apply to a scan. If it takes new commands, those that
+    /// have no time yet apply from this scan on.
+    pub fn apply(&mut self, stamp_ns: i64, takes_new: bool) -> Result<u64, CommandError> {
         self.refresh()?;
-        let undecided = if is_unseen { 1..=self.len() } else { 1..=0 };
-        for number in undecided {
-            if self.from_ns(number).is_none() {
+        for number in 1..=self.len() {
+            if takes_new && self.from_ns(number).is_none() {
                 let appended = self.append(&Line {
                     number,
                     command: None,
                     from_ns: Some(stamp_ns),
                 });
                 match appended {
-                    // A full disk ends no run: the time is known here, for as long as masking
-                    // lives.
-                    Err(CommandError::File { source, .. })
-                        if source.kind() == io::ErrorKind::StorageFull =>
-                    {
+                    // A full disk ends no run: the time is known here, for as long as masking lives.
+                    Err(CommandError::File { source, .. }) if gyre_storage::is_full(&source) => {
                         self.given[number as usize - 1].1 = Some(stamp_ns);
                     }
                     appended => appended?,
@@ -276,27 +272,49 @@ impl Commands {
         Ok(self.applied(stamp_ns))
     }
 
-    /// Returns the number of commands whose times are up to the time of a scan.
+    /// Returns the number of commands up to the last one whose time is up to the time of a scan:
+    /// where the sensor's clock has stepped back, those before have later times.
     pub fn applied(&self, stamp_ns: i64) -> u64 {
-        let apply = |given: &&(Command, Option<i64>)| given.1.is_some_and(|ns| ns <= stamp_ns);
-        self.given.iter().take_while(apply).count() as u64
+        let applies = |given: &(Command, Option<i64>)| given.1.is_some_and(|ns| ns <= stamp_ns);
+        let last = self.given.iter().rposition(applies);
+        last.map_or(0, |index| index as u64 + 1)
     }
 
     fn append(&mut self, line: &Line) -> Result<(), CommandError> {
         let mut text = serde_json::to_string(line).map_err(|error| self.failed(error.into()))?;
         text.push('\n');
-        let mut options = OpenOptions::new();
-        let mut file = options
-            .create(true)
-            .append(true)
-            .open(&self.path)
-            .map_err(|error| self.failed(error))?;
-        // One write, since two processes append.
-        let written = file.write_all(text.as_bytes());
-        written
-            .and_then(|()| file.sync_data())
+        self.append_text(&text)
             .map_err(|error| self.failed(error))?;
         self.refresh()
+    }
+
+    fn append_text(&self, text: &str) -> io::Result<()> {
+        let mut options = OpenOptions::new();
+        let mut file = options.create(true).append(true).open(&self.path)?;
+        // One write, since two processes append.
+        let written = file.write(text.as_bytes())?;
+        if written < text.len() {
+            // The next line must not continue the part that a full disk has taken.
+            let end = file.stream_position()?;
+            file.set_len(end - written as u64)?;
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        file.sync_data()
+    }
+
+    /// Cuts off a line that a power failure has cut short, which the next one would continue.
+    /// Before the processes of the run begin.
+    pub fn cut_torn(out: &Path) -> Result<(), CommandError> {
+        let commands = Self::open(out)?;
+        let cut = |path: &Path| {
+            let file = OpenOptions::new().write(true).open(path)?;
+            file.set_len(commands.read_bytes)?;
+            file.sync_data()
+        };
+        match cut(&commands.path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            cut => cut.map_err(|error| commands.failed(error)),
+        }
     }
 
     fn failed(&self, source: io::Error) -> CommandError {
@@ -368,7 +386,6 @@ mod tests {
             [(); 2].map(|()| Commands::open(folder.path()).unwrap());
         assert_eq!(masking.apply(100, true).unwrap(), 0);
         assert_eq!(supervisor.add(RESET).unwrap(), 1);
-        assert_eq!(masking.apply(150, false).unwrap(), 0);
         assert_eq!(masking.apply(200, true).unwrap(), 1);
         let mut restarted = Commands::open(folder.path()).unwrap();
         assert_eq!(
@@ -379,6 +396,9 @@ mod tests {
         assert_eq!(supervisor.from_ns(1), Some(200));
         assert_eq!(supervisor.between(0, 1).collect::<Vec<_>>(), [&RESET]);
         assert_eq!(supervisor.between(1, 1).count(), 0);
+        // The clock steps back.
+        supervisor.add(RESET).unwrap();
+        assert_eq!(masking.apply(150, true).unwrap(), 2);
     }
 
     #[test]
@@ -391,6 +411,8 @@ mod tests {
         fs::write(&path, format!("{whole}{{\"number\":1,\"fr")).unwrap();
         commands.refresh().unwrap();
         assert_eq!(commands.from_ns(1), None);
+        Commands::cut_torn(folder.path()).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), whole);
         fs::write(&path, format!("{whole}{{\"number\":1,\"from_ns\":7}}\n")).unwrap();
         commands.refresh().unwrap();
         assert_eq!(commands.from_ns(1), Some(7));

@@ -5,7 +5,7 @@ use std::{thread, time::Duration};
 use gyre_client::{Manifest, Next, Run, RunError};
 use gyre_contract::{
     Correction, Fix, FixHeader, Item, Masked, MaskedHeader, Message, Objects, ObjectsHeader, Pose,
-    PoseHeader, PredictedPose, PredictedPoseHeader, Witness,
+    PoseHeader, PredictedPose, PredictedPoseHeader, Witness, flag,
 };
 use gyre_ros2_messages::{
     builtin_interfaces::Time,
@@ -241,6 +241,10 @@ impl PoseTopics {
             (stamp_ns, state.map_from_odometry)
         };
         self.last = Some(*pose);
+        // The sensor's clock may have stepped back.
+        if pose.item.is(flag::BREAK) {
+            self.predicted_ns = None;
+        }
         let mut unsent = 0;
         // The time comes first: what has a later stamp lies in the future of its readers.
         if let Some(topic) = self.clock.as_mut().filter(|_| self.has_clock) {
@@ -273,7 +277,8 @@ impl PoseTopics {
             let stamp_ns = state.stamp_ns(predicted.item.stamp_ns, say);
             (stamp_ns, state.map_from_odometry)
         };
-        let Some(last) = self.last else {
+        // Where a chain starts, nothing is predicted yet: it is of the chain before.
+        let Some(last) = self.last.filter(|last| !last.item.is(flag::BREAK)) else {
             return;
         };
         let pose = PoseHeader {

@@ -1,6 +1,9 @@
 //! The states of a managed node, which publishes while it is active.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{
+    Mutex, PoisonError,
+    atomic::{AtomicU8, Ordering},
+};
 
 use gyre_client::clock;
 use gyre_ros2_messages::lifecycle_msgs::{
@@ -34,36 +37,39 @@ const TRANSITIONS: [(u8, &str, u8, u8); 7] = [
 
 /// The state of a managed node.
 pub struct Lifecycle {
-    current: Mutex<(u8, Outlet<TransitionEvent>)>,
+    current: AtomicU8,
+    /// Locked for the whole of a transition.
+    events: Mutex<Outlet<TransitionEvent>>,
 }
 
 impl Lifecycle {
     pub fn new(events: Outlet<TransitionEvent>) -> Self {
         Self {
-            current: Mutex::new((UNCONFIGURED, events)),
+            current: AtomicU8::new(UNCONFIGURED),
+            events: Mutex::new(events),
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, (u8, Outlet<TransitionEvent>)> {
-        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    fn current(&self) -> u8 {
+        self.current.load(Ordering::Relaxed)
     }
 
     pub fn is_active(&self) -> bool {
-        self.lock().0 == ACTIVE
+        self.current() == ACTIVE
     }
 
     pub fn state(&self) -> State {
-        state_of(self.lock().0)
+        state_of(self.current())
     }
 
     /// Makes a transition, and publishes it; false if the state does not have it.
     pub fn change(&self, wanted: &Transition) -> bool {
-        let mut current = self.lock();
-        let Some((id, label, from, to)) = transition(current.0, wanted) else {
+        let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some((id, label, from, to)) = transition(self.current(), wanted) else {
             return false;
         };
-        current.0 = to;
-        current.1.send(TransitionEvent {
+        self.current.store(to, Ordering::Relaxed);
+        events.send(TransitionEvent {
             timestamp: clock::since_1970_ns().unsigned_abs(),
             transition: Transition {
                 id,

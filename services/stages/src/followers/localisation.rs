@@ -72,14 +72,15 @@ impl Fixes {
         Ok(header)
     }
 
-    /// Returns the place that a command has given since the keyframe before.
+    /// Returns the place that a command has given since the keyframe before. With a new map the
+    /// keyframes begin again, and a place from before is an old one.
     fn given(&mut self, stamp_ns: i64) -> Result<Option<UncertainMotion>, RunError> {
         let new = self.commands.of_scan(stamp_ns).map_err(RunError::input)?;
-        let places = new.filter_map(|command| match command {
+        Ok(new.fold(None, |given, command| match command {
             Command::Locate { at } => Some(at.pose()),
-            Command::Reset { .. } | Command::NewMap {} => None,
-        });
-        Ok(places.last())
+            _ if command.starts_map() => None,
+            _ => given,
+        }))
     }
 }
 

@@ -1,26 +1,28 @@
 //! The commands of the run: masking decides from which scan on a command applies, since it numbers
 //! the scans.
 
-use gyre_contract::{Command, Commands, Item, flag};
+use gyre_contract::{Command, Commands, Item, Window, flag};
 use gyre_transport::RunError;
 
 pub struct AppliedCommands {
     commands: Commands,
-    /// Number of scans that can be in flight.
-    window: usize,
-    /// The first scan that no earlier masking has published: from there on new commands can apply.
-    unseen_from: Option<u64>,
     /// The number of commands that applied to the last scan.
     last: Option<u64>,
+    /// In lossless mode: scans in the window of the start may have been published by the masking
+    /// before, and their readers have them without the commands that are new now. In live mode all
+    /// stages start again with masking.
+    window: Option<Window>,
+    /// The number of the newest pose at the start.
+    begun_at: Option<Option<u64>>,
 }
 
 impl AppliedCommands {
-    pub fn new(commands: Commands, window: usize) -> Self {
+    pub fn new(commands: Commands, window: Option<Window>) -> Self {
         Self {
             commands,
-            window,
-            unseen_from: None,
             last: None,
+            window,
+            begun_at: None,
         }
     }
 
@@ -30,15 +32,15 @@ impl AppliedCommands {
     /// of it or of earlier scans changes any more.
     pub fn mark(&mut self, item: &Item, resume_at: &Item) -> Result<Item, RunError> {
         let newest = (!resume_at.is(flag::BASE)).then_some(resume_at.seq);
-        let first_in_flight = newest.map_or(0, |newest| newest + 1);
-        let unseen_from = first_in_flight.saturating_add(self.window as u64);
-        let is_unseen = item.seq >= *self.unseen_from.get_or_insert(unseen_from);
-        let is_old = item.seq < first_in_flight;
+        let begun_at = *self.begun_at.get_or_insert(newest);
+        let is_old = newest.is_some_and(|newest| item.seq <= newest);
+        let mut window = self.window.iter();
+        let takes_new = !window.any(|window| window.admits(item.seq, begun_at));
         let before = self.last.unwrap_or(resume_at.commands);
         let apply = match is_old {
             true => resume_at.commands,
             false => {
-                let apply = self.commands.apply(item.stamp_ns, is_unseen);
+                let apply = self.commands.apply(item.stamp_ns, takes_new);
                 apply.map_err(RunError::input)?.max(before)
             }
         };
@@ -79,7 +81,7 @@ mod tests {
         fs::create_dir(folder.path().join("journal")).unwrap();
         let open = || Commands::open(folder.path()).unwrap();
         let (base, at) = (Item::default().flagged(flag::BASE), GivenPose::default());
-        let mut first = AppliedCommands::new(open(), 0);
+        let mut first = AppliedCommands::new(open(), None);
         let mut given = open();
         given.add(Command::Locate { at }).unwrap();
         assert_eq!(first.mark(&item(3), &base).unwrap().commands, 1);
@@ -88,7 +90,7 @@ mod tests {
             keep_map: false,
         };
         given.add(reset).unwrap();
-        for masking in [&mut first, &mut AppliedCommands::new(open(), 0)] {
+        for masking in [&mut first, &mut AppliedCommands::new(open(), None)] {
             let mut marked = |seq| masking.mark(&item(seq), &item(3).with_commands(1)).unwrap();
             let states = [4, 5].map(|seq| {
                 let it = marked(seq);
@@ -96,17 +98,8 @@ mod tests {
             });
             assert_eq!(states, [(2, true, 4), (2, false, 4)]);
         }
-        // An earlier masking may have published a window of scans.
-        let mut behind = AppliedCommands::new(open(), 2);
-        let newest = item(4).with_commands(2);
-        given.add(reset).unwrap();
-        let breaks = [5, 6, 7].map(|seq| {
-            let it = behind.mark(&item(seq), &newest).unwrap();
-            (it.commands, it.is(flag::BREAK))
-        });
-        assert_eq!(breaks, [(2, false), (2, false), (3, true)]);
         // The newest pose is of the scan with the reset.
-        let mut resumed = AppliedCommands::new(open(), 0);
+        let mut resumed = AppliedCommands::new(open(), None);
         let newest = item(4).with_commands(2);
         let commands = |it: Item| (it.commands, it.is(flag::BREAK));
         assert_eq!(
@@ -117,6 +110,23 @@ mod tests {
             commands(resumed.mark(&item(5), &newest).unwrap()),
             (2, false)
         );
+    }
+
+    #[test]
+    fn a_new_command_waits_for_a_scan_that_no_masking_before_has_published() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("journal")).unwrap();
+        let open = || Commands::open(folder.path()).unwrap();
+        open().add(Command::NewMap {}).unwrap();
+        let window = Window {
+            scans: 2,
+            ..Window::default()
+        };
+        for _ in 0..2 {
+            let mut masking = AppliedCommands::new(open(), Some(window));
+            let mut commands = |seq| masking.mark(&item(seq), &item(3)).unwrap().commands;
+            assert_eq!([4, 5, 6].map(&mut commands), [0, 0, 1]);
+        }
     }
 
     trait WithCommands {

@@ -84,10 +84,15 @@ impl KnownMotions {
         let Some(first) = seq.checked_sub(lag) else {
             return Some(None);
         };
-        match (first + 1..=seq).any(|seq| self.of(seq) == Some(None)) {
+        match (first + 1..=seq).any(|seq| self.starts(seq)) {
             true => Some(None),
             false => self.of(first),
         }
+    }
+
+    /// Returns whether a chain is known to start with this item.
+    pub fn starts(&self, seq: u64) -> bool {
+        self.of(seq) == Some(None)
     }
 
     fn of(&self, seq: u64) -> Option<Option<Twist>> {

@@ -60,7 +60,10 @@ impl Inputs for Scans {
         let commands = Commands::open(&launch.manifest.out).map_err(RunError::input)?;
         Ok(Self {
             queue,
-            commands: AppliedCommands::new(commands, launch.manifest.window.scans),
+            commands: AppliedCommands::new(
+                commands,
+                (!launch.manifest.live).then_some(launch.manifest.window),
+            ),
             starts_chain: false,
             motions,
             sensors: SampledSensors::new(&launch.sensors()?),
@@ -90,7 +93,8 @@ impl Inputs for Scans {
                 // place of one that waits. Where a chain starts, all motions are known.
                 let item = self.commands.mark(&item, &resume_at)?;
                 self.find_motions(&item);
-                self.starts_chain = item.is(flag::BREAK);
+                // A restarted masking knows from the poses where a reset was.
+                self.starts_chain = self.motions.known.starts(item.seq);
                 self.take_samples()?;
                 return Ok(Action::Process(item, received_ns));
             }

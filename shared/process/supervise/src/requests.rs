@@ -82,7 +82,9 @@ impl Supervisor<'_> {
     fn number(&self, command: Command) -> Result<u64, String> {
         let manifest = &self.run.plan.manifest;
         let (slam, localises) = (manifest.window.slam, manifest.window.localises);
+        let has_masking = self.run.plan.named(StageId::Masking.name()).is_some();
         let missing = match command {
+            _ if !has_masking => Some("the run has no masking, which applies commands"),
             Command::Reset { keep_map: true, .. } | Command::NewMap {} if !slam => {
                 Some("the run has no map: that needs slam.kind")
             }
