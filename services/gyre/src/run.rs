@@ -165,6 +165,8 @@ fn play(
     let (resolved, checked) = (&ready.resolved, &ready.checked);
     let unfinished = earlier.unfinished();
     let signals = signals.map_or_else(Signals::install, Ok)?;
+    // The supervisor consumes the others.
+    let stop = Signals::install()?;
     if let Earlier::Foreign(reason) = earlier {
         out = earlier::close(out, reason)?;
     }
@@ -182,6 +184,7 @@ fn play(
     if let Err(failure) = &report
         && (matches!(failure, SuperviseError::TransportStuck) || has_lost_poses(&plan.manifest))
         && !has_started_over_at(resumed)
+        && !stop.sleep(Duration::ZERO)?
     {
         print::note(format_args!("gyre: {failure}; starting over"));
         let begins_anew = earlier::is_untouched(&out)?;

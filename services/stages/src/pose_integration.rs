@@ -116,9 +116,9 @@ impl Sink for Integration {
             ..PoseHeader::default()
         };
         self.journal.append(&end).map_err(unusable)?;
-        self.require_kept()?;
         // Once the end is published, the run is complete.
-        self.sync()
+        self.sync()?;
+        self.require_kept()
     }
 }
 

@@ -24,7 +24,8 @@ pub const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; cha
 struct Snapshot {
     is_up: bool,
     status: Option<Status>,
-    free_bytes: u64,
+    /// `None`: the folder of the run is unknown or missing.
+    free_bytes: Option<u64>,
     counts: RunCounts,
     processes: Vec<Process>,
 }
@@ -51,7 +52,7 @@ pub fn scrape(view: &RunView) -> String {
     registry.register_collector(Box::new(Snapshot {
         is_up: run.state.is_up(),
         status: view.status(),
-        free_bytes: free_bytes(Path::new(&out)).unwrap_or_default(),
+        free_bytes: free_bytes(Path::new(&out)),
         counts: view.counts(),
         processes: view.processes(),
     }));
@@ -128,7 +129,7 @@ impl Snapshot {
             ("up", "1 while a run works or waits for its radar, else 0.", None, GAUGE, one((self.is_up || waits).into())),
             ("waiting_for_radar", "1 while no azimuth arrives from the radar, else 0.", None, GAUGE, one(waits.into())),
             ("disk_full", "1 while poses wait in memory for room on the disk, or are lost, else 0.", None, GAUGE, one(status.is_some_and(|it| it.disk_is_full).into())),
-            ("disk_free", "Room for the run on the disk of its folder.", Some(Unit::Bytes), GAUGE, one(self.free_bytes)),
+            ("disk_free", "Room for the run on the disk of its folder.", Some(Unit::Bytes), GAUGE, self.free_bytes.map_or_else(|| by("", []), one)),
             ("pose_age", "Time since the newest pose; 0 before the first one, and when the stream has ended.", Some(Unit::Seconds), GAUGE, Values::One(counts.pose_age_s)),
             ("scans_in_flight", "Scans that were published and have no pose yet.", None, GAUGE, one(counts.in_flight)),
             ("motions", "Motions by what they rest on.", None, COUNTER, Values::By("basis", by_basis.collect())),
@@ -261,7 +262,7 @@ mod tests {
         registry.register_collector(Box::new(Snapshot {
             is_up: true,
             status: None,
-            free_bytes: 0,
+            free_bytes: None,
             counts,
             processes: vec![source],
         }));

@@ -18,6 +18,8 @@ const STEP_NS: i64 = 20_000_000;
 pub struct ClockWatch {
     differences_ns: VecDeque<i64>,
     steps: u64,
+    /// The state that a dead source has left, until there is a scan.
+    before: Option<SensorClock>,
 }
 
 impl ClockWatch {
@@ -25,6 +27,7 @@ impl ClockWatch {
     pub fn resume(before: Option<SensorClock>) -> Self {
         Self {
             steps: before.map_or(0, |it| it.steps),
+            before,
             ..Self::default()
         }
     }
@@ -61,11 +64,13 @@ impl ClockWatch {
         }
     }
 
-    /// `None` before the first scan.
+    /// `None` before the first scan of the run.
     pub fn state(&self) -> Option<SensorClock> {
         let mut sorted: Vec<i64> = self.differences_ns.iter().copied().collect();
         sorted.sort_unstable();
-        let offset_ns = *sorted.first()?;
+        let Some(&offset_ns) = sorted.first() else {
+            return self.before;
+        };
         Some(SensorClock {
             offset_ns,
             jitter_ns: sorted[sorted.len() * 9 / 10] - offset_ns,
@@ -104,6 +109,16 @@ mod tests {
             assert_eq!(clock.steps, 1, "{step_ns}");
             assert_eq!(clock.offset_ns, 5 * MS + step_ns);
         }
+    }
+
+    #[test]
+    fn a_source_that_is_started_again_has_the_state_of_the_one_before_until_its_first_scan() {
+        let before = watched(20, |_| 0);
+        let mut watch = ClockWatch::resume(Some(SensorClock { steps: 3, ..before }));
+        assert_eq!(watch.state().map(|it| it.steps), Some(3));
+        watch.add(0, 7 * MS);
+        let clock = watch.state().unwrap();
+        assert_eq!((clock.offset_ns, clock.steps), (7 * MS, 3));
     }
 
     #[test]
