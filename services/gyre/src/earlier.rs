@@ -304,7 +304,7 @@ fn known_poses(
         // A new chain of motions begins, without the old map.
         None if configuration.is_radar() => {
             print::note(format_args!(
-                "gyre: {} does not know pose {}, as after a full disk: the filters of other sensors begin again",
+                "gyre: {} has no state of pose {}, as after a full disk: the filters of other sensors start again",
                 path.display(),
                 complete.saturating_sub(1)
             ));

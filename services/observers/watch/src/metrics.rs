@@ -159,7 +159,7 @@ impl Snapshot {
         let received = self.processes.iter().find_map(|it| it.received);
         if let Some(it) = received {
             metrics.extend([
-                ("radar_scans_left_out", "Turns of the radar of which there is no scan.", None, COUNTER, one(it.scans_left_out)),
+                ("radar_scans_left_out", "Turns of the radar without a scan.", None, COUNTER, one(it.scans_left_out)),
                 ("radar_missing_azimuths", "Azimuths that are missing from the scans.", None, COUNTER, one(it.missing_azimuths)),
                 ("radar_damaged_messages", "Messages of the radar that could not be read.", None, COUNTER, one(it.damaged_messages)),
                 ("radar_foreign_messages", "Datagrams of others, and descriptions that do not fit into the run.", None, COUNTER, one(it.foreign_messages)),
@@ -171,7 +171,7 @@ impl Snapshot {
             metrics.extend([
                 ("radar_clock_steps", "How often the clock of the radar or of this host was set.", None, COUNTER, one(clock.steps)),
                 ("radar_clock_offset", "This host's time minus the radar's at the arrival of a scan, with the least delay of the network.", Some(Unit::Seconds), GAUGE, Values::One(clock.offset_ns as f64 * 1e-9)),
-                ("radar_clock_jitter", "How much later than that nine of ten scans arrive at most.", Some(Unit::Seconds), GAUGE, Values::One(clock.jitter_ns as f64 * 1e-9)),
+                ("radar_clock_jitter", "Delay of a scan beyond this offset: nine of ten have at most this.", Some(Unit::Seconds), GAUGE, Values::One(clock.jitter_ns as f64 * 1e-9)),
             ]);
         }
         metrics
