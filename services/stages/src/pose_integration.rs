@@ -189,7 +189,7 @@ impl Integration {
 
     fn require_kept(&self) -> Result<(), RunError> {
         match disk() {
-            Disk::HasRoom => Ok(()),
+            Disk::HasRoom => sink::set_notice(&self.manifest, ""),
             Disk::IsFull | Disk::Lost(_) => Err(RunError::Input(self.loss())),
         }
     }

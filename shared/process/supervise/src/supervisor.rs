@@ -217,8 +217,21 @@ impl<'a> Supervisor<'a> {
         log::bound_all(self.run.manifest());
         // Without an ending the run has failed already, and reports that failure.
         match ending {
-            Some(_) => self.processes.require_good_ends(&self.followers),
+            Some(_) => {
+                self.processes.require_good_ends(&self.followers)?;
+                self.require_kept()
+            }
             None => Ok(()),
+        }
+    }
+
+    /// Checks that no process was killed at its end with poses in memory.
+    fn require_kept(&self) -> Result<(), SuperviseError> {
+        match sink::notice(self.run.manifest()) {
+            None => Ok(()),
+            Some(notice) => Err(SuperviseError::Process(format!(
+                "{notice}; the process that held them had no time to write them, and they are lost"
+            ))),
         }
     }
 
