@@ -12,8 +12,8 @@ use gyre_configuration::{
     with_stored_options,
 };
 use gyre_contract::{
-    Commands,
-    run::{Ending, Report},
+    Commands, StageId,
+    run::{Ending, Report, Side},
 };
 use gyre_datasets::SampleLog;
 use gyre_geometry::samples::SensorKind;
@@ -271,6 +271,7 @@ fn plan_in(root: &RunRoot, ready: &Ready, programs: &Programs, out: &Out) -> Res
         stall_timeout: limit(resolved.run.stall_timeout_s),
         start_timeout: limit(resolved.run.start_timeout_s),
         cpu_wake_us: resolved.run.cpu_wake_us,
+        takes_commands: resolved.starts(StageId::Masking) && !resolved.is_side(Side::Robot),
         manifest,
     })
 }

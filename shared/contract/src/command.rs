@@ -21,6 +21,8 @@ use thiserror::Error;
 use crate::wire::REACH_M;
 
 const FILE: &str = "journal/commands.jsonl";
+/// Commands of a run. A file that is too large to be read would end the run for good.
+const MOST: u64 = 20_000;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -241,6 +243,10 @@ impl Commands {
     pub fn add(&mut self, command: Command) -> Result<u64, CommandError> {
         self.refresh()?;
         let number = self.len() + 1;
+        if number > MOST {
+            let reason = format!("the run has had {MOST} commands: begin another");
+            return Err(self.failed(io::Error::other(reason)));
+        }
         self.append(&Line {
             number,
             command: Some(command),

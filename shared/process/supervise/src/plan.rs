@@ -33,6 +33,8 @@ pub struct Plan {
     /// Longest time that a processor of the machine may take to wake while the run lives, us;
     /// `None`: as the system has it.
     pub cpu_wake_us: Option<u32>,
+    /// True if the processes that apply commands are here: masking and pose-integration.
+    pub takes_commands: bool,
 }
 
 /// The roles of the processes, which are indices into [`Plan::stages`]: which of them a restart

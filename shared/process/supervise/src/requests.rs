@@ -82,9 +82,10 @@ impl Supervisor<'_> {
     fn number(&self, command: Command) -> Result<u64, String> {
         let manifest = &self.run.plan.manifest;
         let (slam, localises) = (manifest.window.slam, manifest.window.localises);
-        let has_masking = self.run.plan.named(StageId::Masking.name()).is_some();
         let missing = match command {
-            _ if !has_masking => Some("the run has no masking, which applies commands"),
+            _ if !self.run.plan.takes_commands => {
+                Some("commands need masking and pose-integration in one run: here one is absent")
+            }
             Command::Reset { keep_map: true, .. } | Command::NewMap {} if !slam => {
                 Some("the run has no map: that needs slam.kind")
             }

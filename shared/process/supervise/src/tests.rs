@@ -58,5 +58,6 @@ pub(crate) fn plan() -> Plan {
         stall_timeout: Some(LIMIT),
         start_timeout: None,
         cpu_wake_us: None,
+        takes_commands: true,
     }
 }

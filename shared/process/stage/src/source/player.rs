@@ -50,6 +50,8 @@ fn play(
             .map(|topic| read(topic, seq))
             .collect::<Result<_, _>>()?;
         let mut item = item_of(&messages, seq)?;
+        // The file of the commands belongs to the recorded run.
+        item.commands = 0;
         let due_ns = feed.launch.manifest.rate.map(|rate| {
             let origin = (clock::now_ns(), item.stamp_ns);
             let pace = pace.get_or_insert(Pace { rate, origin });
