@@ -81,7 +81,7 @@ pub enum Command {
     Reset(ResetArguments),
     /// Begin a new map of SLAM, in a running run.
     NewMap(RunChoice),
-    /// Give a running run the pose of the vehicle in the map in which it localises.
+    /// Give a running run the pose of the vehicle in its map (slam.map).
     Locate(LocateArguments),
     /// Run a second program beside a stage of a running run, and compare what both make of the same
     /// inputs. Its results are never used.

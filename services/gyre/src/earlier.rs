@@ -421,7 +421,8 @@ pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
 }
 
 /// Prepares the folder for a resumed run: cuts off the remains of the last poses and commands after
-/// a power failure, and writes `config.toml` again if it differs from the run's first configuration.
+/// a power failure, and writes `config.toml` again if it differs from the run's first
+/// configuration.
 pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
     if begun.lost > 0 {
         journal::cut(out.path(), begun.poses)?;

@@ -25,7 +25,7 @@ use gyre_transport::{Manifest, RunError, run, sessions::not_running};
 /// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
 const ANSWER: Duration = Duration::from_secs(15);
 const LOOK: Duration = Duration::from_secs(1);
-/// Time for a scan from which a command applies, and between two looks for it.
+/// Time for the first scan of a command, and between two looks for it.
 const APPLIED: Duration = Duration::from_secs(5);
 const APPLIED_LOOK: Duration = Duration::from_millis(20);
 /// Appended if the client stops waiting for a request that changes something.
@@ -132,7 +132,7 @@ impl Control {
         }
     }
 
-    /// Gives the run a command, and waits for the scan from which it applies. Returns the time of
+    /// Gives the run a command, and waits for its first scan. Returns the time of
     /// that scan, ns on the sensor's clock; `None` if no scan has come: it then applies to the next
     /// one.
     pub fn command(&self, command: Command) -> Result<Option<i64>, RunError> {

@@ -32,7 +32,7 @@ pub enum Command {
     Reset { at: GivenPose, keep_map: bool },
     /// Begin a new map of SLAM with the next scan; the chain of motions continues.
     NewMap {},
-    /// The pose of the vehicle in the map in which the run localises.
+    /// The pose of the vehicle in the map of `slam.map`.
     Locate { at: GivenPose },
 }
 
@@ -48,7 +48,7 @@ pub struct GivenPose {
     pub sigma_rad: f64,
 }
 
-/// The deviations are those of a pose that is given by hand in RViz.
+/// The deviations of a pose that is given by hand in RViz.
 impl Default for GivenPose {
     fn default() -> Self {
         Self {
@@ -121,7 +121,7 @@ pub enum CommandError {
     },
 }
 
-/// A line of the file: a command, or the time from which it applies, or both.
+/// A line of the file: a command, or the time of its first scan, or both.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Line {
@@ -172,7 +172,7 @@ impl Commands {
         self.given.is_empty()
     }
 
-    /// Returns the time from which a command applies; `None` until that is known.
+    /// Returns the time of the first scan of a command; `None` until that is known.
     pub fn from_ns(&self, number: u64) -> Option<i64> {
         let index = usize::try_from(number).ok()?.checked_sub(1)?;
         self.given.get(index)?.1
@@ -267,7 +267,8 @@ impl Commands {
                     from_ns: Some(stamp_ns),
                 });
                 match appended {
-                    // A full disk ends no run: the time is known here, for as long as masking lives.
+                    // A full disk ends no run: the time is known here, for as long as masking
+                    // lives.
                     Err(CommandError::File { source, .. }) if gyre_storage::is_full(&source) => {
                         self.given[number as usize - 1].1 = Some(stamp_ns);
                     }

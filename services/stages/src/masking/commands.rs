@@ -1,5 +1,5 @@
-//! The commands of the run: masking decides from which scan on a command applies, since it numbers
-//! the scans.
+//! The commands of the run: masking numbers the scans, so it decides which scan is the first of a
+//! command.
 
 use gyre_contract::{Command, Commands, Item, Window, flag};
 use gyre_transport::RunError;

@@ -65,7 +65,7 @@ pub fn new_map(choice: &RunChoice) -> Result<(), Failure> {
     applied("has a new map", from_ns)
 }
 
-/// Gives a run the pose of the vehicle in the map in which it localises.
+/// Gives a run the pose of the vehicle in its map (`slam.map`).
 pub fn locate(arguments: &LocateArguments) -> Result<(), Failure> {
     let at = given(arguments.pose, arguments.sigma);
     let run = chosen_to_change(&arguments.run)?;

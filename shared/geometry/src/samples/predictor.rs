@@ -10,9 +10,9 @@ use crate::{
     },
 };
 
-/// Acceleration along the path, m/s², and of the yaw, rad/s²: RMS of what the velocities of motions
-/// over 0.25 s change in 0.25 to 1 s. Two drives of RADIATE and six simulated roads have 0.6 to 1.0
-/// and 0.06 to 0.17: the largest.
+/// Acceleration along the path, m/s², and of the yaw, rad/s²: RMS of the changes in 0.25 to 1 s of
+/// the velocities of motions over 0.25 s. Two drives of RADIATE and six simulated roads have 0.6 to
+/// 1.0 and 0.06 to 0.17: the largest.
 const ACCELERATION_MPS2: f64 = 1.0;
 const YAW_ACCELERATION_RADPS2: f64 = 0.17;
 /// The longest prediction, ns: a scan that is so late is missing.
