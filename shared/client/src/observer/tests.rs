@@ -3,8 +3,8 @@
 use std::{path::Path, rc::Rc, time::Duration};
 
 use gyre_contract::{
-    Correction, Fix, Footprint, Gnss, Item, Loop, LoopHeader, Masked, Message, Motion, Objects,
-    Pose, PredictedPose, Refined, Rotation, Scan, flag,
+    Correction, Fix, Footprint, Gnss, Intake, Item, Loop, LoopHeader, Masked, Message, Motion,
+    Objects, Pose, PredictedPose, Refined, Rotation, Scan, flag,
 };
 use gyre_transport::{
     RunError,
@@ -90,7 +90,7 @@ fn the_footprint_is_what_the_segments_take() {
     let _of_slam = (writer::<Loop>(manifest), writer::<Correction>(manifest));
     let _of_localisation = writer::<Fix>(manifest);
     let _of_objects = writer::<Objects>(manifest);
-    let _of_a_receiver = writer::<Gnss>(manifest);
+    let _of_a_radar = (writer::<Intake>(manifest), writer::<Gnss>(manifest));
     let _between_scans = writer::<PredictedPose>(manifest);
     let files = own_files(Path::new(SHARED_MEMORY), &manifest.prefix);
     let segments = files.filter(|(path, _)| path.extension().is_some_and(|it| it == "data"));
