@@ -1,9 +1,11 @@
 //! The poses between the scans of a live radar: the source has the samples of other sensors first.
 
-use std::time::Duration;
+use std::{num::NonZeroU64, time::Duration};
 
 use gyre_contract::{PredictedPose, PredictedPoseHeader, StageId, run::RunConfig};
 use gyre_geometry::samples::{Sample, SensorConfigs};
+use rustix::thread::set_current_timer_slack;
+
 use gyre_transport::{
     RunError, clock,
     numbers::{self, Numbers},
@@ -20,7 +22,7 @@ const SENT: &str = "source.predictions";
 pub(super) struct Predictions {
     configs: SensorConfigs,
     output: Writer<PredictedPose>,
-    period: Duration,
+    period_ns: i64,
     /// When the next one is due, `CLOCK_MONOTONIC`, ns.
     due_ns: i64,
     /// The sensor's clock minus `CLOCK_MONOTONIC`, ns, by the last scan.
@@ -36,12 +38,14 @@ impl Predictions {
         if run.predict_hz == 0.0 {
             return Ok(None);
         }
+        // By default the system ends a wait up to 50 us late. If it refuses, poses are that late.
+        let _ = set_current_timer_slack(NonZeroU64::new(1));
         let manifest = &launch.manifest;
         let [next] = numbers::read(&manifest.root.join(SENT)).unwrap_or_default();
         Ok(Some(Self {
             configs: launch.sensors()?,
             output: Writer::open(&launch.node, manifest)?,
-            period: Duration::from_secs_f64(1.0 / run.predict_hz),
+            period_ns: (1e9 / run.predict_hz) as i64,
             due_ns: clock::now_ns(),
             ahead_ns: None,
             sent: Numbers::open(manifest, SENT)?,
@@ -70,7 +74,8 @@ impl Predictions {
         if now_ns < self.due_ns {
             return Ok(());
         }
-        self.due_ns = now_ns + self.period.as_nanos() as i64;
+        // Without drift, and without a burst after a pause.
+        self.due_ns = (self.due_ns + self.period_ns).max(now_ns);
         let Some((last, ahead_ns)) = credit.last.as_ref().zip(self.ahead_ns) else {
             return Ok(());
         };
