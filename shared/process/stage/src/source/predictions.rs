@@ -4,13 +4,12 @@ use std::{num::NonZeroU64, time::Duration};
 
 use gyre_contract::{PredictedPose, PredictedPoseHeader, StageId, run::RunConfig};
 use gyre_geometry::samples::{Sample, SensorConfigs};
-use rustix::thread::set_current_timer_slack;
-
 use gyre_transport::{
     RunError, clock,
     numbers::{self, Numbers},
     writer::Writer,
 };
+use rustix::thread::set_current_timer_slack;
 
 use super::Credit;
 use crate::Launch;
