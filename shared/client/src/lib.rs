@@ -39,7 +39,7 @@ pub use gyre_transport::{
     AnyMessage, Listener, Manifest, RecordedMessage, RunError, clock, log,
     reader::Received,
     received, run, sessions,
-    wake::{self, MAX_WAIT, Signals, wait_for_readable},
+    wake::{self, MAX_WAIT, Signals, let_signals_end_the_process, wait_for_readable},
     writer::TopicWriter,
 };
 pub use last_line::last_line;

@@ -9,7 +9,9 @@ use std::{
 };
 
 use clap::Args;
-use gyre_client::{Next, Observer, Run, Signals, Usage, clock, control::Control};
+use gyre_client::{
+    Next, Observer, Run, Signals, Usage, clock, control::Control, let_signals_end_the_process,
+};
 use gyre_configuration::terminal::{Failure, WIDTH, print};
 use gyre_contract::{
     Pose, PoseHeader, SampleRates, Scan, StageId, WitnessCounts,
@@ -63,6 +65,8 @@ pub fn top(arguments: &TopArguments) -> Result<(), Failure> {
         wait(&mut snapshots, every, || Ok(signals.sleep(PERIOD)?))?;
         return print::line(screen::text(&snapshots.take()?, width()));
     }
+    // A closed terminal has an event without end, which leaves no time to look for a signal.
+    let_signals_end_the_process()?;
     let mut terminal = ratatui::try_init()
         .map_err(|error| format!("the terminal cannot be used: {error}; --once prints text"))?;
     let shown = show(&mut terminal, &mut snapshots, every);
