@@ -64,7 +64,7 @@ fn a_command_that_changes_nothing_is_an_error() {
     let reset = r#"{"number":1,"command":{"reset":{"at":{},"keep_map":false}}"#;
     let late = run.set(&format!("source.commands='{}'", given.display()));
     for (line, words) in [
-        (format!("{reset}}}"), "command 1 has no time"),
+        (format!("{reset}}}"), "command 1 lacks the time"),
         (
             format!("{reset},\"from_ns\":9000000000000000000}}"),
             "0 of 1 commands",

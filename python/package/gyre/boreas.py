@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
 
-# The drives of pyboreas 2.0.0 (pyboreas/data/splits.py), without `boreas-`. Boreas has one map, which is no part of the odometry; in Boreas-RT
-# the first drive of each place is its map.
+# The drives of pyboreas 2.0.0 (pyboreas/data/splits.py), without `boreas-`. Boreas has one map,
+# which is no part of the odometry; in Boreas-RT the first drive of each place is its map.
 BOREAS_MAP = "2020-11-26-13-58"
 BOREAS = """
     2020-12-04-14-00 2021-01-26-10-59 2021-02-09-12-55 2021-03-09-14-23 2021-04-22-15-00 2021-06-29-18-53 2021-06-29-20-43
@@ -38,7 +38,8 @@ BOREAS_RT = """
 """
 PLACES = [line.split() for line in BOREAS_RT.strip().splitlines()]
 
-# The drives whose odometry is judged; the drives whose localisation is judged, each with that of its map.
+# The drives whose odometry is judged. The drives whose localisation is judged, each with the
+# drive of its map.
 ODOMETRY = {"boreas": BOREAS, "boreasrt": sum(PLACES, [])}
 LOCALISATION = {
     "boreas": {drive: BOREAS_MAP for drive in BOREAS if drive not in BOREAS_ODOMETRY_ONLY},

@@ -59,7 +59,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the topics of ROS 2 from which a run receives gyro, wheels and others.
+/// Returns the topics of ROS 2 with the samples of a run's other sensors.
 fn sensors_in_ros2(configuration: &Configuration) -> Vec<String> {
     let sensors = configuration.odometry.sensors.sampled();
     let in_ros2 = sensors.iter().filter(|it| it.kind() == SensorKind::Ros2);

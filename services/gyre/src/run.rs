@@ -220,7 +220,7 @@ fn commands(configuration: &Configuration) -> Result<Option<String>, Failure> {
     let commands = Commands::read(path)?;
     match (1..=commands.len()).find(|number| commands.from_ns(*number).is_none()) {
         Some(number) => Err(format!(
-            "{} (source.commands): command {number} has no time from which it applies",
+            "{} (source.commands): command {number} lacks the time of its first scan (from_ns)",
             path.display()
         )
         .into()),

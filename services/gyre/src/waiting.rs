@@ -25,8 +25,8 @@ const PAUSE: Duration = Duration::from_secs(1);
 /// Time between two reports that the radar is waited for.
 const REPORT_EVERY: Duration = Duration::from_secs(60);
 
-/// Returns what is waited for. Of a run that nobody looks at, the name of its radar may be unknown
-/// because the network is not there yet; elsewhere the name is a mistake.
+/// Returns the part that is missing and may come. Of a run that nobody looks at, the name of its
+/// radar may be unknown because the network is not there yet; elsewhere the name is a mistake.
 fn awaited(error: &Failure, is_deployed: bool) -> Option<&'static str> {
     if let Some(radar) = error.downcast_ref::<AskError>() {
         let may_come = radar.may_pass || (radar.is_unknown_name && is_deployed);

@@ -132,9 +132,8 @@ impl Control {
         }
     }
 
-    /// Gives the run a command, and waits for its first scan. Returns the time of
-    /// that scan, ns on the sensor's clock; `None` if no scan has come: it then applies to the next
-    /// one.
+    /// Gives the run a command, and waits for its first scan. Returns the time of that scan, ns on
+    /// the sensor's clock; `None` if no scan has taken it: it then applies to the next one.
     pub fn command(&self, command: Command) -> Result<Option<i64>, RunError> {
         let number = match self.ask(&Request::Command(command), NOT_LATER)? {
             Answer::Numbered(number) => number,

@@ -1,7 +1,6 @@
-//! Commands that change the poses of a run from a scan on. With the scans they are the inputs of a
-//! run: each is kept in `journal/commands.jsonl` with the time of the scan from which it applies,
-//! so that a resumed run computes the same poses, and so does another run that has the file as its
-//! `source.commands`.
+//! Commands that change the poses of a run from a scan on. They are inputs of a run, as its scans
+//! are: `journal/commands.jsonl` has each with the time of its first scan. So a resumed run
+//! computes the same poses. Another run does too that has the file as its `source.commands`.
 //!
 //! The supervisor appends a command. Masking, which numbers the scans, appends the time of the next
 //! scan, before it publishes that scan with the number of commands that apply to it
@@ -143,7 +142,7 @@ pub struct Commands {
 }
 
 impl Commands {
-    /// Reads the commands of the run that writes to `out`; without the file there are none.
+    /// Reads the commands of the run that writes to `out`; a missing file is empty.
     pub fn open(out: &Path) -> Result<Self, CommandError> {
         Self::read(&out.join(FILE))
     }
@@ -252,6 +251,11 @@ impl Commands {
             command: Some(command),
             from_ns: None,
         })?;
+        if let Some(folder) = self.path.parent().filter(|_| number == 1) {
+            // The name of the new file survives a power failure, as the poses with its numbers do.
+            let synchronised = gyre_storage::sync_folder(folder);
+            synchronised.map_err(|error| self.failed(io::Error::other(error)))?;
+        }
         Ok(number)
     }
 
@@ -259,21 +263,17 @@ impl Commands {
     /// have no time yet apply from this scan on.
     pub fn apply(&mut self, stamp_ns: i64, takes_new: bool) -> Result<u64, CommandError> {
         self.refresh()?;
-        for number in 1..=self.len() {
-            if takes_new && self.from_ns(number).is_none() {
-                let appended = self.append(&Line {
-                    number,
-                    command: None,
-                    from_ns: Some(stamp_ns),
-                });
-                match appended {
-                    // A full disk ends no run: the time is known here, for as long as masking
-                    // lives.
-                    Err(CommandError::File { source, .. }) if gyre_storage::is_full(&source) => {
-                        self.given[number as usize - 1].1 = Some(stamp_ns);
-                    }
-                    appended => appended?,
-                }
+        let without_time = |it: &Self| (1..=it.len()).find(|number| it.from_ns(*number).is_none());
+        while let Some(number) = without_time(self).filter(|_| takes_new) {
+            let appended = self.append(&Line {
+                number,
+                command: None,
+                from_ns: Some(stamp_ns),
+            });
+            match appended {
+                // It applies when the disk has room: all processes have to know the time.
+                Err(CommandError::File { source, .. }) if gyre_storage::is_full(&source) => break,
+                appended => appended?,
             }
         }
         Ok(self.applied(stamp_ns))

@@ -112,8 +112,8 @@ wire! {
         /// The first number that its generation gives. Items of earlier generations with this
         /// number or a later one are void: nothing was computed from them that lasts.
         pub numbered_from: u64,
-        /// Number of commands to the run that apply to this scan, from masking on: the last command
-        /// of the scan before and this one differ where one applies from this scan on.
+        /// Number of commands to the run that apply to this scan. Masking sets it; it grows with
+        /// the first scan of a command.
         pub commands: u64,
         /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
         pub stamp_ns: i64,

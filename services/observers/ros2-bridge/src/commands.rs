@@ -15,7 +15,7 @@ pub struct Done {
     message: String,
 }
 
-/// Begins the odometry and the map anew.
+/// Begins odometry and map again.
 pub fn reset(shared: &Shared) -> Done {
     let at = GivenPose::default();
     give(
@@ -31,8 +31,8 @@ pub fn new_map(shared: &Shared) -> Done {
     give(shared, Command::NewMap {})
 }
 
-/// Gives the run a pose in its own map, or in the map in which it localises: the frame of the
-/// message decides.
+/// Gives the run a pose in its own map, or in the map of `slam.map`: the frame of the message
+/// decides.
 pub fn initial_pose(shared: &Shared, message: &PoseWithCovarianceStamped) -> Done {
     let vehicle = &shared.settings.vehicle;
     let (pose, sigmas) = vehicle.given(message);
@@ -79,7 +79,7 @@ fn give(shared: &Shared, command: Command) -> Done {
         Ok(Some(_)) => (true, "applied to the next scan".to_owned()),
         Ok(None) => (
             true,
-            "no scan has come: it applies to the next one".to_owned(),
+            "no scan has taken it yet: it applies to the next one".to_owned(),
         ),
         Err(error) => (false, error.to_string()),
     };

@@ -246,7 +246,7 @@ impl PoseTopics {
             self.predicted_ns = None;
         }
         let mut unsent = 0;
-        // The time comes first: what has a later stamp lies in the future of its readers.
+        // The time comes first: a later stamp is in the future of a reader.
         if let Some(topic) = self.clock.as_mut().filter(|_| self.has_clock) {
             let clock = Time::from_ns(stamp_ns);
             unsent += u64::from(!topic.send(Clock { clock }));
@@ -277,7 +277,7 @@ impl PoseTopics {
             let stamp_ns = state.stamp_ns(predicted.item.stamp_ns, say);
             (stamp_ns, state.map_from_odometry)
         };
-        // Where a chain starts, nothing is predicted yet: it is of the chain before.
+        // Nothing is predicted where a chain starts: the prediction is of the chain before.
         let Some(last) = self.last.filter(|last| !last.item.is(flag::BREAK)) else {
             return;
         };
@@ -373,7 +373,7 @@ fn publish_fix(
     );
 }
 
-/// Publishes what an item contains, if it contains something, and counts it.
+/// Publishes the message of an item, if it has one, and counts it.
 fn publish_some<M: Serialize>(
     topic: &mut Outlet<M>,
     shared: &Shared,

@@ -33,7 +33,7 @@ pub struct Services {
 }
 
 impl Services {
-    /// Opens the services; those of its states only for a managed node.
+    /// Opens the services. Only a managed node has services for its states.
     pub fn open(node: &mut Node, is_managed: bool) -> Result<Self, RunError> {
         let mut services = Self {
             wakeups: Wakeups::new()?,

@@ -16,7 +16,7 @@ pub struct Settings {
     pub vehicle: Vehicle,
     /// True to publish `odom` -> `base_link` and `map` -> `odom`: only one program may.
     pub transforms: bool,
-    /// Time by which the transform `map` -> `odom` is dated ahead, ns.
+    /// Stamp of the transform `map` -> `odom` minus the stamp of its pose, ns.
     pub ahead_ns: i64,
     pub map: bool,
     /// True to publish the time of a replay.
@@ -37,7 +37,7 @@ pub struct RunSettings {
     pub predicts: bool,
     /// True if the run plays a recording or a simulation, not a radar.
     pub is_replay: bool,
-    /// The topics of ROS 2 from which it receives other sensors.
+    /// The topics of ROS 2 with the samples of its other sensors.
     pub sensor_topics: Vec<String>,
 }
 

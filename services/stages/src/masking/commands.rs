@@ -91,7 +91,7 @@ mod tests {
         };
         given.add(reset).unwrap();
         for masking in [&mut first, &mut AppliedCommands::new(open(), None)] {
-            let mut marked = |seq| masking.mark(&item(seq), &item(3).with_commands(1)).unwrap();
+            let mut marked = |seq| masking.mark(&item(seq), &item_with(3, 1)).unwrap();
             let states = [4, 5].map(|seq| {
                 let it = marked(seq);
                 (it.commands, it.is(flag::BREAK), it.previous_scan)
@@ -100,7 +100,7 @@ mod tests {
         }
         // The newest pose is of the scan with the reset.
         let mut resumed = AppliedCommands::new(open(), None);
-        let newest = item(4).with_commands(2);
+        let newest = item_with(4, 2);
         let commands = |it: Item| (it.commands, it.is(flag::BREAK));
         assert_eq!(
             commands(resumed.mark(&item(4), &newest).unwrap()),
@@ -129,13 +129,10 @@ mod tests {
         }
     }
 
-    trait WithCommands {
-        fn with_commands(self, commands: u64) -> Self;
-    }
-
-    impl WithCommands for Item {
-        fn with_commands(self, commands: u64) -> Self {
-            Self { commands, ..self }
+    fn item_with(seq: u64, commands: u64) -> Item {
+        Item {
+            commands,
+            ..item(seq)
         }
     }
 }

@@ -8,9 +8,6 @@ use crate::{Keyframe, closing::GAP_M};
 /// A scan becomes a keyframe at this distance or rotation from the last keyframe, m and degrees.
 const DISTANCE_M: f64 = 2.0;
 const ANGLE_DEG: f64 = 15.0;
-/// Length of the path that counts between a keyframe and one whose pose is given, m: the two are in
-/// no common submap, and can close a loop.
-const PATH_TO_GIVEN_M: f64 = GAP_M;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScanPose {
@@ -100,7 +97,8 @@ impl KeyframeBuilder {
                     None => path_m + distance_m,
                     Some(covariance) => {
                         self.motion = UncertainMotion { motion, covariance };
-                        path_m + PATH_TO_GIVEN_M
+                        // The two are in no common submap, and can close a loop.
+                        path_m + GAP_M
                     }
                 }
             }
@@ -203,7 +201,7 @@ mod tests {
         let apart = apart.inv_mul(&given.pose.motion);
         assert!(apart.translation.vector.norm() < 1e-12 && apart.rotation.angle().abs() < 1e-12);
         assert_eq!(keyframe.motion.covariance, covariance);
-        assert_eq!(keyframe.path_m, required.path_m + PATH_TO_GIVEN_M);
+        assert_eq!(keyframe.path_m, required.path_m + GAP_M);
         assert!(builder.next(&given).is_none(), "once");
     }
 

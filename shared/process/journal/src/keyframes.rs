@@ -192,7 +192,7 @@ mod tests {
         Command::Reset { at, keep_map }
     }
 
-    /// Whatever of the reset a kill leaves behind, the keyframes are those of the new map.
+    /// The keyframes are of the new map, also if a kill leaves a part of the reset behind.
     #[test]
     fn a_new_map_has_the_keyframes_since_its_reset_also_after_a_kill() {
         for journalled in [4, 5] {

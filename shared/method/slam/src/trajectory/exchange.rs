@@ -16,7 +16,7 @@ const ANY_HEADING_RAD: f64 = 10.0;
 impl TrajectoryEstimator {
     /// Returns a g2o file whose optimum by plain least squares are the poses of the keyframes:
     /// odometry, the loops that are used, and the fixes of GNSS as [`priors`]. Loops and fixes have
-    /// the information with which the last solution counted them.
+    /// the information of the last solution.
     pub fn g2o(&self) -> String {
         let Estimator::Graph(graph) = &self.estimator else {
             let used = self.loops.iter().filter(|it| it.is_used());
