@@ -10,7 +10,7 @@ use crate::common::{Ended, Run, gyre, real_data, recording};
 const FEW: &str = "source.scans=60";
 const NEAR: &str = "points.max_range_m=50";
 /// By how much the recording is read with too long ranges, m.
-const WRONG_BY_M: f64 = 0.25;
+const WRONG_BY_M: f64 = 0.4;
 
 fn calibrate(recording: &Path, out: &Path, set: &[&str], words: &[&str]) -> Ended {
     let mut command = gyre();
@@ -54,20 +54,14 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let out = tempfile::tempdir().unwrap();
     let (said, right_m) = wrongly_read(out.path(), &[]);
     let line = |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap();
-    for (name, end) in [
-        ("range offset", "CONTRADICTS the configured value"),
-        ("check ", ": better"),
-    ] {
-        assert!(line(name).ends_with(end), "{name}: {said}");
-    }
-    let alone = "a drive alone cannot tell it";
+    let contradicts = line("range offset").ends_with("CONTRADICTS the configured value");
+    assert!(contradicts, "{said}");
+    let alone = "a drive alone cannot determine it";
     assert!(line("range resolution").contains(alone), "{said}");
     assert!(!line("Doppler shift").contains("CONTRADICTS"), "{said}");
-    let picture = fs::read_to_string(out.path().join("calibration.svg")).unwrap();
-    assert!(picture.contains("as configured") && picture.contains("as proposed"));
-    let words = line("overlap of the scans").split(' ');
-    let overlap: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
-    assert!(overlap.len() == 2 && overlap[1] > overlap[0], "{said}");
+    let words = line("parts of the scans").split([' ', ',']);
+    let differ: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+    assert!(differ.len() == 2 && differ[1] < differ[0], "{said}");
 
     let file = out.path().join("calibration.toml");
     let found_m = range_offset_m(&fs::read_to_string(&file).unwrap());
@@ -95,7 +89,6 @@ fn two_drives_determine_a_radar_better_than_one() {
     let [alone, both] = [each, together].map(offset_of);
     assert!((both[0] - alone[0]).abs() < 1e-3, "{said}");
     assert!((both[1] - alone[1] / 2f64.sqrt()).abs() < 1e-3, "{said}");
-    assert!(out.path().join("calibration-2.svg").exists());
     let file = fs::read_to_string(out.path().join("calibration.toml")).unwrap();
     assert!((range_offset_m(&file) - both[0]).abs() < 1e-3, "{file}");
 }

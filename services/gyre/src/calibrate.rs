@@ -4,25 +4,26 @@
 mod sensors;
 
 use std::{
+    cell::RefCell,
     path::{Path, PathBuf},
     time::Instant,
 };
 
 use clap::Args;
-use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
+use gyre_calibration::{Configured, Drive, Found, Study};
 use gyre_configuration::{
     Configuration, Played, describe_masks_in_process,
     terminal::{Failure, inputs::Inputs, print},
     with_stored_options,
 };
-use gyre_datasets::{DatasetOptions, ground_truth::read_trajectory};
+use gyre_datasets::Format;
 use gyre_geometry::OwnedScan;
-use gyre_matching::odometry::Odometry;
-use gyre_radar::Trajectory;
-use gyre_results::{Content, Out, judgement::judge, truth_of};
+use gyre_results::{Content, Out};
 use gyre_storage as storage;
 use gyre_tools::bar::Bar;
 use sensors::{Section, Sensor};
+
+const MAX_SCANS: usize = 2000;
 
 #[derive(Debug, Args)]
 pub struct CalibrateArguments {
@@ -32,7 +33,7 @@ pub struct CalibrateArguments {
     /// drives together. May be repeated.
     #[arg(long, value_name = "RECORDING")]
     pub with: Vec<PathBuf>,
-    /// The folder of calibration.toml and calibration.svg.
+    /// The folder of calibration.toml.
     #[arg(long, default_value = "out/calibrate")]
     pub out: PathBuf,
     /// The log of a gyro, a table as CSV: its clock and its axes are found too. Default: what lies
@@ -48,8 +49,23 @@ pub struct CalibrateArguments {
     #[arg(long, value_parser = length, conflicts_with = "with")]
     pub distance_m: Option<f64>,
     /// Maximum number of scans of a drive. Their points are kept in memory.
-    #[arg(long, default_value = "2000")]
+    #[arg(long, default_value_t = MAX_SCANS)]
     pub scans: usize,
+}
+
+impl CalibrateArguments {
+    /// All defaults, for the drive of a run.
+    pub(crate) fn of_run(run: &Path) -> Self {
+        Self {
+            inputs: Inputs::default(),
+            with: Vec::new(),
+            out: run.to_owned(),
+            gyro: None,
+            wheels: None,
+            distance_m: None,
+            scans: MAX_SCANS,
+        }
+    }
 }
 
 /// Parses a length: a positive number.
@@ -60,27 +76,17 @@ fn length(text: &str) -> Result<f64, String> {
 }
 
 const SECTION: &str = "calibration.toml";
-const PICTURE: &str = "calibration.svg";
 
-/// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
+/// Finds the constants, prints them, and writes `calibration.toml`.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);
     let _locked = Out::lock_for(&arguments.out, Content::CALIBRATION)?;
     let drives = read_drives(arguments)?;
     let sensors = Section::of(&drives)?;
-    let radar = found_by(drives, &arguments.out);
-    let found = radar.as_ref().ok();
-    let ates_m = found.and_then(|it| ates_m(arguments, it));
-    let is_worse = ates_m.is_some_and(|[before, after]| after > before);
-    let better = if is_worse { "NOT better" } else { "better" };
-    let check = ates_m.map_or(
-        "compare runs with the file and without".to_owned(),
-        |[a, b]| format!("ATE {a:.3} m as configured, {b:.3} m with the file: {better}"),
-    );
+    let radar = found_by(drives);
     let text = match &radar {
-        Ok(found) if is_worse => format!("# NOT recommended: {check}\n{}", toml(found)),
-        Ok(found) => toml(found),
+        Ok(found) => found.toml(),
         // A drive may determine only the other constants: a drive that stands and turns determines
         // only the gyro.
         Err(error) if sensors.is_told => {
@@ -91,15 +97,9 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<(), Failure> {
     };
     storage::write(&file, text + &sensors.text)?;
     let (seconds, file) = (started.elapsed().as_secs_f64(), file.display());
-    let advice = match is_worse {
-        true => "is NOT recommended",
-        false => "for `gyre run --calibration`",
-    };
-    print::line(format_args!("{seconds:.0} s; {file} {advice}"))?;
-    if let Ok(found) = radar {
-        print::line(format_args!("{:<21} {check}", "check"))?;
-        print::line(found.overlap())?;
-    }
+    print::line(format_args!(
+        "{seconds:.0} s; {file} for `gyre run --calibration`"
+    ))?;
     sensors.refused.map_or(Ok(()), Err)
 }
 
@@ -115,12 +115,14 @@ fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure>
     Ok(drives)
 }
 
-fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
-    let studies = drives.into_iter().enumerate().map(|(k, drive)| match k {
-        0 => drive.study(&out.join(PICTURE)),
-        _ => drive.study(&out.join(format!("calibration-{}.svg", k + 1))),
+fn found_by(drives: Vec<Recorded>) -> Result<Found, Failure> {
+    let studies = drives.into_iter().map(|drive| {
+        let name = drive.name.clone();
+        let study = drive.study()?;
+        print::line(format_args!("{name}: {}", study.found))?;
+        Ok(study)
     });
-    let mut studies: Vec<Study> = studies.collect::<Result<_, _>>()?;
+    let mut studies: Vec<Study> = studies.collect::<Result<_, Failure>>()?;
     if studies.len() == 1 {
         return Ok(studies.remove(0).found);
     }
@@ -129,17 +131,18 @@ fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
     Ok(found)
 }
 
-struct Recorded {
+pub(crate) struct Recorded {
     name: String,
-    drive: Drive,
+    pub(crate) format: Format,
+    pub(crate) drive: Drive,
     configured: Configured,
     /// In the order of the kinds.
-    sensors: Vec<Option<Sensor>>,
+    pub(crate) sensors: Vec<Option<Sensor>>,
 }
 
 impl Recorded {
     /// Registers the scans of a recording, as many as are asked for at most.
-    fn read(
+    pub(crate) fn read(
         mut configuration: Configuration,
         arguments: &CalibrateArguments,
     ) -> Result<Self, Failure> {
@@ -180,6 +183,7 @@ impl Recorded {
         let options = with_stored_options(&configuration)?.dataset;
         Ok(Self {
             name: configuration.data(),
+            format: dataset.format(),
             drive,
             configured: Configured {
                 geometry: scan.geometry,
@@ -216,49 +220,15 @@ impl Recorded {
         }
     }
 
-    fn study(self, picture: &Path) -> Result<Study, Failure> {
-        print::note(format_args!("comparing {}, 1 s a scan", self.name));
-        let study = Study::new(self.drive, &self.configured)?;
-        print::line(format_args!("{}: {}", self.name, study.found))?;
-        storage::write(picture, svg(&study.drive, &study.calibration))?;
-        Ok(study)
+    pub(crate) fn study(self) -> Result<Study, Failure> {
+        let scans = self.drive.sweeps.len() as u64;
+        let progress = RefCell::new((Bar::new(None), 0));
+        let study = Study::new(self.drive, &self.configured, &|| {
+            let (bar, done) = &mut *progress.borrow_mut();
+            *done += 1;
+            bar.scans(scans, scans, format!("comparison {done} of their parts"));
+        });
+        progress.into_inner().0.finish();
+        Ok(study?)
     }
-}
-
-/// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.
-fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f64; 2]> {
-    let mut configuration = arguments.inputs.configuration().ok()?;
-    sensors::leave_out(&mut configuration.odometry.sensors);
-    let truth = read_trajectory(&truth_of(&configuration, &arguments.out)?).ok()?;
-    let before = ate_m(&configuration, arguments.scans, &truth).ok()?;
-    let file: ::toml::Table = toml(found).parse().ok()?;
-    let constants: DatasetOptions = file["dataset"].clone().try_into().ok()?;
-    configuration.dataset = constants.or(&configuration.dataset);
-    if let Some(min_range_m) = found.min_range_m {
-        configuration.odometry.points.min_range_m = min_range_m as f32;
-        configuration.odometry.raster.min_range_m = min_range_m as f32;
-    }
-    // If the drive cannot be registered with the constants, they are worse.
-    let after = ate_m(&configuration, arguments.scans, &truth);
-    Some([before, after.unwrap_or(f64::INFINITY)])
-}
-
-fn ate_m(configuration: &Configuration, scans: usize, truth: &Trajectory) -> Result<f64, Failure> {
-    let mut dataset = gyre_configuration::open(configuration)?.dataset;
-    let mut odometry = Odometry::new(&configuration.odometry)?;
-    let mut scan = OwnedScan::with_limits(dataset.limits());
-    let (mut poses, mut stamps_ns) = (Vec::new(), Vec::new());
-    for number in configuration.source.played(dataset.scans()).take(scans) {
-        // What cannot be read was named when the drive was read.
-        if let Ok(geometry) = dataset.read(number, scan.slot()) {
-            scan.geometry = geometry;
-            if let Ok(registered) = odometry.register(&scan.view(), &[]) {
-                stamps_ns.push(geometry.stamp_ns);
-                poses.push(registered.pose.motion);
-            }
-        }
-    }
-    let stamp_ns = Some(stamps_ns);
-    let estimate = Trajectory { stamp_ns, poses };
-    Ok(judge(&estimate, truth)?.ate.rmse_m)
 }

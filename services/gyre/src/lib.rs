@@ -26,6 +26,7 @@ pub mod run;
 pub mod simulate;
 pub mod stage;
 pub mod stress;
+mod verdict;
 mod waiting;
 pub mod watch;
 
@@ -87,7 +88,12 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         #[cfg(feature = "link")]
         Command::Link { end } => return link::link(&end),
         Command::Doctor => return doctor(),
-        Command::Evaluate(arguments) => return gyre_results::evaluate::evaluate(&arguments),
+        Command::Evaluate(arguments) => {
+            return match arguments.run_alone() {
+                Some(run) => verdict::judge(run),
+                None => gyre_results::evaluate::evaluate(&arguments),
+            };
+        }
         Command::Conformance(arguments) => return conformance::conformance(&arguments),
         Command::Config(arguments) => {
             return gyre_configuration::terminal::inputs::config(&arguments);

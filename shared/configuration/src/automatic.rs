@@ -72,6 +72,11 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
     })
 }
 
+/// Returns the median power of some scans of a recording.
+pub fn noise_floor(data: &Path, options: &DatasetOptions) -> Result<u8, AutomaticError> {
+    Ok(Measured::of(gyre_recording::open(data, options)?.as_mut())?.noise)
+}
+
 /// The constants of a `dataset.toml` override the constants of its format. A recorded run has its
 /// own.
 pub fn radar_constants(

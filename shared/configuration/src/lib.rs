@@ -18,7 +18,7 @@ pub mod strict;
 #[cfg(feature = "run")]
 pub mod terminal;
 
-pub use automatic::{Automatic, AutomaticError, automatic, radar_constants};
+pub use automatic::{Automatic, AutomaticError, automatic, noise_floor, radar_constants};
 #[cfg(feature = "run")]
 pub use configuration::{Configuration, difference, process_names};
 #[cfg(feature = "run")]

@@ -76,6 +76,16 @@ fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> 
     Ok(ExitCode::SUCCESS)
 }
 
+impl EvaluateArguments {
+    /// Returns the run that is to be compared with itself: it has no ground truth, or that is not
+    /// wanted.
+    pub fn run_alone(&self) -> Option<&Path> {
+        let run = self.estimate.as_path();
+        let has_none = || self.ground_truth.is_none() && truth_of_run(run).is_err();
+        (run.is_dir() && !self.objects && (self.alone || has_none())).then_some(run)
+    }
+}
+
 /// Returns the files that are compared: of a run, its trajectory and its ground truth.
 fn files(arguments: &EvaluateArguments) -> Result<[PathBuf; 2], Failure> {
     let (estimate, given) = (&arguments.estimate, arguments.ground_truth.clone());

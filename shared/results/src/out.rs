@@ -55,7 +55,7 @@ impl Content {
     pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log");
     pub const FIXES: Self = Self("gyre localise", LOCK, "fixes.csv fixes.tum fixes.png");
     pub const MASKS: Self = Self("gyre masks", "masks.png", "masks.png");
-    pub const CALIBRATION: Self = Self("gyre calibrate", LOCK, "calibration.toml calibration.svg calibration-2.svg");
+    pub const CALIBRATION: Self = Self("gyre calibrate", LOCK, "calibration.toml");
     pub const PLOTS: Self = Self("gyre evaluate", LOCK, "trajectory.svg errors.svg bands.svg");
     pub const STRESS: Self = Self("gyre stress", LOCK, "config.toml report.json");
     pub const SHADOW: Self = Self("gyre shadow", LOCK, "shadow.csv shadow.json shadow.txt");

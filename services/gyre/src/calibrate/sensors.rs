@@ -61,10 +61,10 @@ pub(super) fn leave_out(config: &mut SensorConfigs) {
 }
 
 /// The log of a sensor in a drive.
-pub(super) struct Sensor {
-    kind: &'static Kind,
-    log: SampleLog,
-    configured: SensorSettings,
+pub(crate) struct Sensor {
+    pub(crate) kind: &'static Kind,
+    pub(crate) log: SampleLog,
+    pub(crate) configured: SensorSettings,
     /// It was named, rather than found beside the scans.
     is_named: bool,
 }

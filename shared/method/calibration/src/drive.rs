@@ -51,8 +51,6 @@ pub struct Track {
     pub motions: Vec<UncertainMotion>,
     pub twists: Vec<Twist>,
     starts: Vec<bool>,
-    /// The change of the configured facts.
-    pub(crate) change: FactVector,
 }
 
 impl Drive {
@@ -154,6 +152,23 @@ impl Drive {
         Ok(forward?.mean(&reversed?, self))
     }
 
+    /// Returns how the track in the order of time differs from the track against it: the ratio of
+    /// their lengths less 1, and the turn between their ends over the length, rad/m.
+    pub fn reversal(&self) -> Result<[f64; 2], SettingError> {
+        let [forward, reversed] = [false, true].map(|it| self.track(&FactVector::zeros(), it));
+        let (forward, reversed) = (forward?, reversed?);
+        let [length_m, other_m] = [&forward, &reversed].map(|it| {
+            let path_m = it.path_m();
+            path_m.last().copied().unwrap_or_default().max(1e-3)
+        });
+        let ends = [&forward, &reversed].map(|it| it.poses.last().map(|pose| pose.rotation));
+        let turn_rad = match ends {
+            [Some(one), Some(other)] => (one.inverse() * other).angle(),
+            _ => 0.0,
+        };
+        Ok([other_m / length_m - 1.0, turn_rad / length_m])
+    }
+
     /// Registers all scans under changed facts, in the order of time or against it.
     fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, SettingError> {
         let count = self.sweeps.len();
@@ -198,12 +213,12 @@ impl Drive {
             }
             earlier = Some((scan, points));
         }
-        Ok(Track::new(motions, self, *change))
+        Ok(Track::new(motions, self))
     }
 }
 
 impl Track {
-    fn new(motions: Vec<UncertainMotion>, drive: &Drive, change: FactVector) -> Self {
+    fn new(motions: Vec<UncertainMotion>, drive: &Drive) -> Self {
         let mut poses: Vec<Pose> = Vec::with_capacity(motions.len());
         for motion in &motions {
             let before = poses.last().copied().unwrap_or_else(Pose::identity);
@@ -221,7 +236,6 @@ impl Track {
             motions,
             twists,
             starts,
-            change,
         }
     }
 
@@ -244,7 +258,7 @@ impl Track {
             motion: gyre_geometry::interpolate(&a.motion, &b.motion, 0.5),
             covariance: a.covariance,
         });
-        Self::new(motions.collect(), drive, self.change)
+        Self::new(motions.collect(), drive)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The facts about a radar that a drive can determine, and their effects on its points.
 
 use gyre_geometry::SparsePoint;
-use nalgebra::{SMatrix, SVector, Vector2};
+use nalgebra::{SMatrix, SVector};
 
 pub const FACTS: usize = 3;
 
@@ -28,9 +28,15 @@ impl Fact {
         [0.2, 0.6e-3, 0.01][self as usize]
     }
 
-    /// Returns a small change of the fact, for derivatives.
-    pub fn step(self) -> f64 {
-        [0.05, 1e-3, 0.01][self as usize]
+    /// Returns the error of the method itself, which more scans do not reduce: on simulated drives
+    /// whose constants are known.
+    pub(crate) fn error(self) -> f64 {
+        [0.03, 0.4e-3, 0.002][self as usize]
+    }
+
+    /// Returns a change of the fact for derivatives: large, since alignments are noisy.
+    pub(crate) fn step(self) -> f64 {
+        [0.1, 1.5e-3, 0.01][self as usize]
     }
 }
 
@@ -63,47 +69,9 @@ pub(crate) fn correct(
     }
 }
 
-/// Returns the derivatives by the facts of where a point is seen, in the sensor's frame: two rows,
-/// one column for each fact. `chirp` is the sign of its Doppler shift.
-pub(crate) fn displacements(
-    seen: Vector2<f64>,
-    chirp: f64,
-    velocity_mps: &Vector2<f64>,
-    sense: Sign,
-) -> SMatrix<f64, 2, FACTS> {
-    let range_m = seen.norm().max(1e-3);
-    let along = seen / range_m;
-    let across = Vector2::new(-along.y, along.x);
-    SMatrix::from_columns(&[
-        along,
-        across * (range_m * sense * along.x),
-        along * (chirp * along.dot(velocity_mps)),
-    ])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn displacements_are_the_derivatives_of_the_correction() {
-        let point = SparsePoint::from([20.0, -15.0, 0.06, 0.5, 0.04]);
-        let seen = Vector2::new(20.0, -15.0);
-        for sense in [-1.0, 1.0] {
-            let by_facts = displacements(seen, 1.0, &Vector2::zeros(), sense);
-            for fact in [Fact::RangeOffset, Fact::Eccentricity] {
-                let mut change = FactVector::zeros();
-                change[fact as usize] = fact.step();
-                let moved = correct(&point, &change, sense, false);
-                let moved = Vector2::new(f64::from(moved.x_m), f64::from(moved.y_m)) - seen;
-                let expected = by_facts.column(fact as usize) * fact.step();
-                assert!(
-                    (moved - expected).norm() < 1e-4,
-                    "{fact:?}: {moved} for {expected}"
-                );
-            }
-        }
-    }
 
     #[test]
     fn where_chirps_alternate_the_shift_has_the_sign_of_the_chirp() {

@@ -1,16 +1,23 @@
-//! The constants that were found, beside the configured ones, and the evidence for each.
+//! The constants that were found beside the configured ones, and the file with those that are
+//! wrong.
 
-mod constant;
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
+use std::fmt::{self, Write};
 
 use gyre_geometry::SweepGeometry;
 
-use crate::{Calibration, CalibrationError, Drive, FACTS, Fact, FactVector, OwnReflections};
-pub use constant::Constant;
-use constant::{Label, constant, resolution};
+use crate::{
+    Calibration, CalibrationError, Drive, Estimate, FACTS, Fact, FactVector, OwnReflections,
+    calibrate,
+};
+
+/// The given length of the path over that by the scans: beyond, it is of another drive, or scans
+/// are missing.
+const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+/// Least relative difference of the path between both directions of time: the error of its length.
+const PATH_ERROR: f64 = 1e-3;
 
 /// The configuration of the drive before it is calibrated.
 pub struct Configured {
@@ -23,8 +30,10 @@ pub struct Configured {
     pub distance_m: Option<f64>,
 }
 
-/// The key in `[dataset]`, the name, the unit for printing and the factor to it of each constant in
-/// the order of [`Fact::ALL`].
+/// Key in `[dataset]`, name, unit for printing, and factor to that unit.
+type Label = (&'static str, &'static str, &'static str, f64);
+
+/// In the order of [`Fact::ALL`].
 const LABELS: [Label; FACTS] = [
     ("range_offset_m", "range offset", "m", 1.0),
     (
@@ -35,31 +44,55 @@ const LABELS: [Label; FACTS] = [
     ),
     ("doppler_s", "Doppler shift", "s", 1.0),
 ];
+const RESOLUTION: Label = ("range_resolution_m", "range resolution", "m", 1.0);
 
-pub struct Found {
-    pub scans: usize,
-    pub path_m: f64,
-    has_settled: bool,
-    /// Mean overlap of scans of one place as configured, and with the drive's findings.
-    overlap: [f64; 2],
-    /// The constants but for the range resolution.
-    pub constants: Vec<Constant>,
-    /// The range resolution, if the length of the path is given.
-    resolution: Result<Constant, String>,
-    /// Range that leaves out the vehicle's own reflections, m, if it is more than configured.
-    pub min_range_m: Option<f64>,
-    reflections: Option<String>,
+#[derive(Clone)]
+struct Constant {
+    label: Label,
+    configured: f64,
+    found: Estimate,
+    verdict: Verdict,
 }
 
-impl Found {
-    /// Compares the findings with the configuration.
+#[derive(Clone, Copy, PartialEq)]
+enum Verdict {
+    Undetermined,
+    Agrees,
+    Contradicts,
+    /// It contradicts the configured value, but with it the parts of the scans differ more.
+    Worse,
+}
+
+/// A drive with its findings.
+pub struct Study {
+    pub drive: Drive,
+    calibration: Calibration,
+    pub found: Found,
+}
+
+pub struct Found {
+    scans: usize,
+    path_m: f64,
+    pairs: usize,
+    has_settled: bool,
+    constants: Vec<Constant>,
+    /// The size of the differences between the parts of the scans as configured, and with the
+    /// constants that contradict it.
+    differences: [f64; 2],
+    /// The range resolution, if the length of the path is given.
+    resolution: Option<Constant>,
+    /// Sentences about the range resolution and the vehicle's own reflections.
+    notes: Vec<(&'static str, String)>,
+}
+
+impl Study {
+    /// Calibrates a drive; `progress` is called every few seconds.
     pub fn new(
-        drive: &Drive,
-        calibration: &Calibration,
+        drive: Drive,
         configured: &Configured,
+        progress: &dyn Fn(),
     ) -> Result<Self, CalibrationError> {
-        let path_m = calibration.after.path_m().last().copied();
-        let path_m = path_m.unwrap_or_default();
+        let calibration = calibrate(&drive, progress)?;
         let geometry = &configured.geometry;
         // If the scans contain the direction of chirps, its sign is the chirp's.
         let doppler_s = match (drive.alternates, f64::from(geometry.doppler_s)) {
@@ -71,119 +104,238 @@ impl Found {
             configured.eccentricity_rad,
             doppler_s,
         ];
-        let constants =
-            (0..FACTS).map(|k| constant(LABELS[k], values[k], &calibration.facts[k], calibration));
-        Ok(Self {
+        let constant = |fact: Fact| {
+            let (k, change) = (fact as usize, calibration.changes[fact as usize]);
+            let found = Estimate::new(values[k] + change.value, change.sigma);
+            Constant::new(fact, values[k], found, calibration.has_settled)
+        };
+        let mut found = Found {
             scans: drive.sweeps.len(),
-            path_m,
+            path_m: 0.0,
+            pairs: calibration.pairs,
             has_settled: calibration.has_settled,
-            overlap: calibration.overlap,
-            constants: constants.collect(),
-            resolution: resolution(path_m, configured)?,
-            min_range_m: drive.reflections.min_range_m(configured.min_range_m),
-            reflections: Some(reflections(&drive.reflections, configured.min_range_m)),
+            constants: Fact::ALL.map(constant).to_vec(),
+            differences: [1.0; 2],
+            resolution: None,
+            notes: Vec::new(),
+        };
+        found.compare(calibration.differences(&drive, &found.change(), progress)?);
+        let track = drive.mean_track_with(&found.change())?;
+        found.path_m = track.path_m().last().copied().unwrap_or_default();
+        found.resolve(configured)?;
+        let own = reflections(&drive.reflections, configured.min_range_m);
+        found.notes.push(("own reflections", own));
+        Ok(Self {
+            drive,
+            calibration,
+            found,
         })
     }
 
-    /// Returns the means over several drives, each weighted by its uncertainty, with their overlap
-    /// yet to be compared. Each drive keeps the rest in its own findings.
-    pub(crate) fn mean(all: &[&Self]) -> Self {
-        let drives = || all.iter();
-        let constants = (0..all[0].constants.len()).map(|k| {
-            let of_drives: Vec<_> = drives().map(|it| &it.constants[k]).collect();
-            Constant::mean(&of_drives)
-        });
-        Self {
+    /// Combines the findings of several drives of one radar, each weighted by its uncertainty.
+    pub fn combined(studies: &[Self]) -> Result<Found, CalibrationError> {
+        let drives = || studies.iter().map(|study| &study.found);
+        let has_settled = drives().all(|it| it.has_settled);
+        let constant = |fact: Fact| {
+            let mut all = drives().map(|it| &it.constants[fact as usize]);
+            let first = all.next().map_or(Estimate::UNKNOWN, |it| it.found);
+            let found = all.fold(first, |mean, next| mean.combined(&next.found));
+            let configured = studies[0].found.constants[fact as usize].configured;
+            Constant::new(fact, configured, found, has_settled)
+        };
+        let mut found = Found {
             scans: drives().map(|it| it.scans).sum(),
             path_m: drives().map(|it| it.path_m).sum(),
-            has_settled: drives().all(|it| it.has_settled),
-            overlap: [0.0; 2],
-            constants: constants.collect(),
-            resolution: Err("as configured: --distance-m tells it from one drive alone".to_owned()),
-            min_range_m: drives().filter_map(|it| it.min_range_m).reduce(f64::max),
-            reflections: None,
-        }
-    }
-
-    pub(crate) fn change(&self) -> FactVector {
-        let mut change = FactVector::zeros();
-        for (fact, constant) in Fact::ALL.into_iter().zip(&self.constants) {
-            if constant.is_proposed {
-                change[fact as usize] = constant.found.value - constant.configured;
-            }
-        }
-        change
-    }
-
-    /// Takes the overlap as configured and as proposed; a lower overlap revokes the proposal.
-    pub(crate) fn compared(mut self, overlap: [f64; 2]) -> Self {
-        self.overlap = overlap;
-        if overlap[1] < overlap[0] {
-            for constant in &mut self.constants {
-                constant.is_proposed = false;
-            }
-        }
-        self
-    }
-
-    pub fn proposed(&self) -> impl Iterator<Item = &Constant> {
-        let solved = self
-            .constants
-            .iter()
-            .filter(|constant| constant.is_proposed);
-        solved.chain(self.resolution.as_ref().ok())
-    }
-
-    pub fn kept(&self) -> impl Iterator<Item = &Constant> {
-        self.constants
-            .iter()
-            .filter(|constant| !constant.is_proposed)
-    }
-
-    pub fn overlap(&self) -> String {
-        let [before, after] = self.overlap;
-        let with = match after < before {
-            true => "with what was found, which is less: it is not proposed",
-            false if self.constants.iter().any(|it| it.is_proposed) => "with what is proposed",
-            false => "after: no constant that it determines is proposed",
+            pairs: drives().map(|it| it.pairs).sum(),
+            has_settled,
+            constants: Fact::ALL.map(constant).to_vec(),
+            differences: [1.0; 2],
+            resolution: None,
+            notes: Vec::new(),
         };
-        format!("overlap of the scans  {before:.4} as configured, {after:.4} {with}")
+        let (change, mut differences) = (found.change(), [0.0; 2]);
+        for study in studies {
+            let share = study.found.pairs as f64 / found.pairs as f64;
+            let of_drive = study
+                .calibration
+                .differences(&study.drive, &change, &|| ())?;
+            differences = [0, 1].map(|k| differences[k] + share * of_drive[k]);
+        }
+        found.compare(differences);
+        Ok(found)
+    }
+}
+
+impl Constant {
+    fn new(fact: Fact, configured: f64, found: Estimate, has_settled: bool) -> Self {
+        let is_determined = has_settled && found.sigma < fact.useful_sigma();
+        Self {
+            label: LABELS[fact as usize],
+            configured,
+            found,
+            verdict: match (is_determined, found.contradicts(configured)) {
+                (false, _) => Verdict::Undetermined,
+                (true, false) => Verdict::Agrees,
+                (true, true) => Verdict::Contradicts,
+            },
+        }
+    }
+}
+
+impl Found {
+    /// The change of the constants that contradict the configured ones.
+    fn change(&self) -> FactVector {
+        FactVector::from_fn(|k, _| match &self.constants[k] {
+            it if it.verdict == Verdict::Contradicts => it.found.value - it.configured,
+            _ => 0.0,
+        })
+    }
+
+    /// Takes how much the parts of the scans differ as configured and as found: constants with
+    /// which they differ more are not written.
+    fn compare(&mut self, differences: [f64; 2]) {
+        self.differences = differences;
+        if differences[1] > differences[0] {
+            let found = self.constants.iter_mut();
+            found
+                .filter(|it| it.verdict == Verdict::Contradicts)
+                .for_each(|it| it.verdict = Verdict::Worse);
+        }
+    }
+
+    /// Takes the range resolution from the length of the path.
+    fn resolve(&mut self, configured: &Configured) -> Result<(), CalibrationError> {
+        let resolution_m = f64::from(configured.geometry.range_resolution_m);
+        let path_m = self.path_m;
+        let Some(distance_m) = configured.distance_m else {
+            let note = format!(
+                "{resolution_m:.5} m as configured: a drive alone cannot determine it, since a larger world driven through faster looks the same; \
+                 the path is {path_m:.1} m: give its length by an odometer or GNSS with --distance-m"
+            );
+            self.notes.push((RESOLUTION.1, note));
+            return Ok(());
+        };
+        let ratio = distance_m / path_m;
+        if !PLAUSIBLE_RATIO.contains(&ratio) {
+            return Err(CalibrationError::Unusable(format!(
+                "--distance-m is {distance_m:.1}, but the path of the scans is {path_m:.1} m: give the length of this drive, from its first scan to its last"
+            )));
+        }
+        let found = Estimate::new(resolution_m * ratio, resolution_m * ratio * PATH_ERROR);
+        self.resolution = Some(Constant {
+            label: RESOLUTION,
+            configured: resolution_m,
+            found,
+            verdict: match found.contradicts(resolution_m) {
+                true => Verdict::Contradicts,
+                false => Verdict::Agrees,
+            },
+        });
+        Ok(())
+    }
+
+    /// Returns whether the drive agrees with the configured constants; `None` if it determines none
+    /// of them.
+    pub fn agrees(&self) -> Option<bool> {
+        let verdicts = || self.constants.iter().map(|constant| constant.verdict);
+        match verdicts().all(|it| it == Verdict::Undetermined) {
+            true => None,
+            false => {
+                Some(verdicts().all(|it| matches!(it, Verdict::Undetermined | Verdict::Agrees)))
+            }
+        }
+    }
+
+    /// Returns a line for each constant: the value that was found, and the configured one.
+    pub fn constants(&self) -> impl Iterator<Item = String> {
+        self.constants.iter().map(Constant::to_string)
+    }
+
+    /// Returns `calibration.toml`: the constants that contradict the configured ones, and why the
+    /// others stay as configured.
+    pub fn toml(&self) -> String {
+        let mut text = format!(
+            "# Found by gyre calibrate from {} scans, {:.0} m.\n\n[dataset]\n",
+            self.scans, self.path_m
+        );
+        for constant in self.constants.iter().chain(&self.resolution) {
+            let (found, configured) = (constant.found, constant.configured);
+            let digits = (1.0 - found.sigma.log10().floor()).clamp(1.0, 9.0) as usize;
+            let (key, verdict) = (constant.label.0, constant.verdict);
+            let _ = match verdict {
+                Verdict::Contradicts => writeln!(
+                    text,
+                    "{key} = {:.digits$} # \u{b1} {:.digits$}, configured {configured:.digits$}",
+                    found.value, found.sigma
+                ),
+                _ => writeln!(
+                    text,
+                    "# {key} stays {configured:.digits$}: {found:.digits$} {verdict}"
+                ),
+            };
+        }
+        text
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Undetermined => "is too uncertain to be used",
+            Self::Agrees => "agrees with the configured value",
+            Self::Contradicts => "CONTRADICTS the configured value",
+            Self::Worse => "makes the parts of the scans differ more",
+        })
     }
 }
 
 fn reflections(own: &OwnReflections, configured_m: f64) -> String {
-    match (own.end_m(), own.min_range_m(configured_m)) {
-        (None, _) => "too few moving scans to tell them".to_owned(),
-        (Some(end_m), _) if end_m >= OwnReflections::REACH_M => format!(
-            "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to tell them"
+    match own.end_m() {
+        None => "too few moving scans to find them".to_owned(),
+        Some(end_m) if end_m >= OwnReflections::REACH_M => format!(
+            "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to find them"
         ),
-        (Some(end_m), Some(min_range_m)) => format!(
-            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {configured_m}: that and raster.min_range_m are to be {min_range_m:.1}"
-        ),
-        (Some(end_m), None) => {
-            format!("to {end_m:.2} m, within points.min_range_m = {configured_m}")
+        Some(end_m) => {
+            format!(
+                "to {end_m:.2} m in nine of ten moving scans; points.min_range_m = {configured_m}"
+            )
         }
+    }
+}
+
+impl fmt::Display for Constant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (_, name, unit, scale) = self.label;
+        let (found, verdict) = (self.found.times(scale), self.verdict);
+        let configured = self.configured * scale;
+        write!(
+            f,
+            "{name:<21} {found} {unit}, configured {configured:.4}: {verdict}"
+        )
     }
 }
 
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} scans, {:.0} m", self.scans, self.path_m)?;
+        let (scans, path_m, pairs) = (self.scans, self.path_m, self.pairs);
+        write!(f, "{scans} scans, {path_m:.0} m, {pairs} pairs of scans")?;
         if !self.has_settled {
             write!(
                 f,
                 "\nthe constants have not settled: take a longer drive, or begin with constants that are nearer"
             )?;
         }
-        for constant in self.constants.iter().chain(self.resolution.as_ref().ok()) {
+        for constant in self.constants.iter().chain(&self.resolution) {
             write!(f, "\n{constant}")?;
         }
-        if let Err(reason) = &self.resolution {
-            write!(f, "\n{:<21} {reason}", "range resolution")?;
+        for (name, note) in &self.notes {
+            write!(f, "\n{name:<21} {note}")?;
         }
-        if let Some(sentence) = &self.reflections {
-            write!(f, "\n{:<21} {sentence}", "own reflections")?;
-        }
-        Ok(())
+        let [before, after] = self.differences;
+        write!(
+            f,
+            "\n{:<21} differ by {before:.3} as configured, by {after:.3} with what contradicts it",
+            "parts of the scans"
+        )
     }
 }

@@ -1,40 +1,28 @@
 //! The constants of a radar, found from a drive alone, without ground truth.
 //!
 //! A wrong constant displaces the echoes of a scan by a smooth field, which moves with the vehicle.
-//! So two scans of one place from different poses cannot coincide: the slope of their overlap by
-//! each constant, at the relative pose that is best for it, shows the direction of the right one.
-//! Wrong constants also make the track drift. [`calibrate`] solves both;
-//! [`calibrate_sensor`] finds the clocks of the other sensors by the same track.
+//! So the left and the right half of the scans measure different turns, the front and the rear
+//! different distances. [`calibrate`] finds the constants under which they measure the same.
+//! [`calibrate_sensor`] finds the clocks of the other sensors by the track of the radar.
 
 mod calibrate;
-mod drift;
 mod drive;
 mod error;
 mod facts;
 mod findings;
-mod image;
-mod overlap;
 mod own_reflections;
-mod pair;
-mod picture;
-mod revisits;
-mod section;
+mod parts;
 mod sensor;
-mod study;
 
-pub use calibrate::{Calibration, FactEstimate, calibrate};
+pub use calibrate::{Calibration, calibrate};
 pub use drive::{Drive, Sweep, Track};
 pub use error::CalibrationError;
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};
-pub use findings::{Configured, Found};
-pub use own_reflections::OwnReflections;
-pub use picture::svg;
-pub use revisits::Revisit;
-pub use section::toml;
+pub use findings::{Configured, Found, Study};
+use own_reflections::OwnReflections;
 pub use sensor::{
     ClockError, Compared, Kind, SensorCalibration, SensorSettings, calibrate_sensor, compare, kinds,
 };
-pub use study::Study;
 
 use std::fmt;
 

@@ -65,11 +65,4 @@ impl OwnReflections {
         let last = own.map(|(k, _)| k % CELLS + 1).max().unwrap_or(0);
         (self.scans >= MIN_SCANS).then_some(last as f64 * CELL_M)
     }
-
-    /// Returns the range that leaves them out, in steps of 0.1 m, if it is more than the configured
-    /// one.
-    pub fn min_range_m(&self, configured_m: f64) -> Option<f64> {
-        let end_m = self.end_m().filter(|end_m| *end_m < Self::REACH_M)?;
-        (end_m > configured_m).then(|| (end_m * 10.0).ceil() / 10.0)
-    }
 }

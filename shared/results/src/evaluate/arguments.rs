@@ -14,6 +14,10 @@ pub struct EvaluateArguments {
     /// radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv. Default: that of the
     /// run.
     pub ground_truth: Option<PathBuf>,
+    /// Compare a run with itself and with the sensors beside the radar, as where there is no ground
+    /// truth: the exit code is 1 if the result is bad.
+    #[arg(long, conflicts_with_all = ["ground_truth", "objects"])]
+    pub alone: bool,
     /// Evaluate the objects of a run against those of the recording that is named in the place of
     /// the ground truth, a simulated one: its objects.csv and its ground_truth.tum.
     #[arg(long, conflicts_with_all = ["find_time_offset", "plots", "odometry"])]

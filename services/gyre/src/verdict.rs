@@ -1,0 +1,320 @@
+//! `gyre evaluate RUN` without a ground truth: compares a run with itself and with the sensors
+//! beside the radar.
+
+use std::{fs, path::Path, process::ExitCode};
+
+use gyre_calibration::{Study, calibrate_sensor};
+use gyre_configuration::{
+    Configuration,
+    terminal::{Failure, print},
+};
+use gyre_datasets::{
+    InspectedLogs, LostAzimuthOption, SampleLog, ground_truth::read_trajectory, inspect_dataset,
+};
+use gyre_geometry::{Pose, pose, samples::SampleKind};
+use gyre_radar::Trajectory;
+use gyre_results::{judgement, require_results};
+use serde_json::Value;
+
+use crate::calibrate::{CalibrateArguments, Recorded};
+
+/// Largest share of motions that the radar did not measure.
+const UNMEASURED: f64 = 0.1;
+/// Largest differences between the drive and the same drive backwards: of the length, and of the
+/// turn, degrees/100 m.
+const REVERSED_LENGTH: f64 = 0.005;
+const REVERSED_DEG: f64 = 0.5;
+/// Largest error at loops: of the position as a share of the path, and of the heading,
+/// degrees/100 m.
+const LOOP_SHARE: f64 = 0.005;
+const LOOP_DEG: f64 = 0.2;
+/// Steps of half a decibel of `masking.threshold` above the median power.
+const ABOVE_NOISE: std::ops::RangeInclusive<i64> = 28..=54;
+/// Largest difference of the lengths by the radar and by GNSS, over stretches of [`STRETCH_M`].
+const SCALE: f64 = 0.01;
+const STRETCH_M: f64 = 20.0;
+const MIN_STRETCHES: usize = 10;
+/// Wheels are less certain: tyres wear.
+const WHEELS_SCALE: f64 = 0.05;
+
+struct Check {
+    name: &'static str,
+    figure: String,
+    /// `None`: the drive does not determine it.
+    passes: Option<bool>,
+}
+
+impl Check {
+    fn new(name: &'static str, passes: Option<bool>, figure: String) -> Self {
+        Self {
+            name,
+            figure,
+            passes,
+        }
+    }
+
+    fn is_missing(name: &'static str, figure: &str) -> Self {
+        Self::new(name, None, figure.to_owned())
+    }
+}
+
+/// Prints the checks of a run and the verdict. The exit code is 1 if a check fails.
+pub fn judge(run: &Path) -> Result<ExitCode, Failure> {
+    require_results(run)?;
+    let configuration = Configuration::read(&run.join("config.toml"), &[])?;
+    let summary: Value = serde_json::from_str(&fs::read_to_string(run.join("summary.json"))?)?;
+    let arguments = CalibrateArguments::of_run(run);
+    let recorded = Recorded::read(configuration.clone(), &arguments)?;
+    let mut checks = vec![motions(&summary)];
+    checks.extend(of_scans(&configuration, &summary)?);
+    let sensors = of_sensors(&recorded)?;
+    match recorded.study() {
+        Ok(study) => checks.extend(of_parts(&study)?),
+        Err(error) => checks.push(Check::is_missing("constants", &error.to_string())),
+    }
+    checks.push(loops(&summary));
+    checks.push(gnss(&configuration, run)?);
+    checks.extend(sensors);
+    for check in &checks {
+        let word = match check.passes {
+            Some(true) => "good",
+            Some(false) => "BAD",
+            None => "unknown",
+        };
+        print::line(format_args!(
+            "{:<15} {word:<8} {}",
+            check.name, check.figure
+        ))?;
+    }
+    let named = |passes: Option<bool>| {
+        let checks = checks.iter().filter(|check| check.passes == passes);
+        checks
+            .map(|check| check.name)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let (bad, unknown) = (named(Some(false)), named(None));
+    let unknown = match unknown.as_str() {
+        "" => String::new(),
+        names => format!("; not determined: {names}"),
+    };
+    match bad.as_str() {
+        "" => print::line(format_args!("verdict         good{unknown}"))?,
+        names => print::line(format_args!("verdict         BAD: {names}{unknown}"))?,
+    }
+    Ok(ExitCode::from(u8::from(!bad.is_empty())))
+}
+
+fn motions(summary: &Value) -> Check {
+    let count = |name: &str| summary["motions"][name].as_f64().unwrap_or_default();
+    let [refined, doubtful] = ["refined", "doubtful"].map(count);
+    let unmeasured = doubtful / (refined + doubtful).max(1.0);
+    Check::new(
+        "motions",
+        Some(unmeasured <= UNMEASURED),
+        format!(
+            "{doubtful} of {} are weak or predicted; at most {:.0} %",
+            refined + doubtful,
+            100.0 * UNMEASURED
+        ),
+    )
+}
+
+/// The power above the noise, and azimuths that the host has lost.
+fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>, Failure> {
+    if configuration.streamed().is_some() {
+        return Ok(Vec::new());
+    }
+    let (path, options) = (&configuration.source.data, &configuration.dataset);
+    let noise = i64::from(gyre_configuration::noise_floor(path, options)?);
+    let threshold = i64::from(configuration.odometry.masking.floor());
+    let above = threshold - noise;
+    let is_ignored = options.lost_azimuths == Some(LostAzimuthOption::Ignore);
+    let mut read = options.clone();
+    read.lost_azimuths = None;
+    let dataset = gyre_recording::open(path, &read)?;
+    let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default(), None);
+    let stale = report.figures["rows"]["stale_scans"].as_u64().unwrap_or(0);
+    let repaired = &summary["lost"]["scans"];
+    Ok(vec![
+        Check::new(
+            "threshold",
+            Some(ABOVE_NOISE.contains(&above)),
+            format!(
+                "{threshold}: {above} steps above the median power; {} to {}",
+                ABOVE_NOISE.start(),
+                ABOVE_NOISE.end()
+            ),
+        ),
+        Check::new(
+            "lost azimuths",
+            Some(!(is_ignored && stale > 0)),
+            match (stale, is_ignored) {
+                (0, _) => "none".to_owned(),
+                (_, true) => format!("{stale} scans lack azimuths, and the run ignored it"),
+                (_, false) => format!("repaired in {repaired} scans"),
+            },
+        ),
+    ])
+}
+
+/// The constants by the parts of the scans, and the drive backwards.
+fn of_parts(study: &Study) -> Result<[Check; 2], Failure> {
+    let constants: Vec<_> = study.found.constants().collect();
+    let [length, turn] = study.drive.reversal()?;
+    let turn_deg = 100.0 * turn.to_degrees();
+    let agrees = length.abs() <= REVERSED_LENGTH && turn_deg.abs() <= REVERSED_DEG;
+    Ok([
+        Check::new(
+            "constants",
+            study.found.agrees(),
+            constants.join(&format!("\n{:<25}", "")),
+        ),
+        Check::new(
+            "reversed",
+            Some(agrees),
+            format!(
+                "length {:.2} %, heading {turn_deg:.2} deg/100 m different; at most {} % and {REVERSED_DEG}",
+                100.0 * length,
+                100.0 * REVERSED_LENGTH
+            ),
+        ),
+    ])
+}
+
+fn loops(summary: &Value) -> Check {
+    let at_loops = &summary["slam"]["odometry"];
+    let of = |name: &str| at_loops[name].as_f64().unwrap_or_default();
+    let (Some(loops), Some(path_m)) = (at_loops["loops"].as_u64(), summary["path_m"].as_f64())
+    else {
+        return Check::is_missing(
+            "loops",
+            "run with slam.kind = \"graph\", on a drive that sees a place again",
+        );
+    };
+    let (share, deg) = (
+        of("translation_rmse_m") / path_m,
+        of("rotation_rmse_deg") / (0.01 * path_m),
+    );
+    Check::new(
+        "loops",
+        Some(share <= LOOP_SHARE && deg <= LOOP_DEG),
+        format!(
+            "odometry errs by {:.2} m, {:.2} deg at {loops} loops; at most {:.2} m, {:.2} deg",
+            of("translation_rmse_m"),
+            of("rotation_rmse_deg"),
+            LOOP_SHARE * path_m,
+            LOOP_DEG * 0.01 * path_m
+        ),
+    )
+}
+
+/// The scale and the sense of the trajectory by the fixes beside the scans, which the run may not
+/// have used.
+fn gnss(configuration: &Configuration, run: &Path) -> Result<Check, Failure> {
+    const NAME: &str = "gnss";
+    let found = SampleLog::find(SampleKind::Gnss, &configuration.source.data);
+    let log = found.and_then(|file| SampleLog::read(SampleKind::Gnss, &file, None));
+    let log = match log {
+        Ok(log) => log,
+        Err(error) => return Ok(Check::is_missing(NAME, &error.to_string())),
+    };
+    let fixes = log.on_radar(&configuration.gnss);
+    let mut fixes = Trajectory::timed(
+        fixes.iter().map(|fix| fix.stamp_ns).collect(),
+        fixes
+            .iter()
+            .map(|fix| pose(fix.east_m, fix.north_m, 0.0))
+            .collect(),
+    );
+    let estimate = read_trajectory(&run.join("trajectory.tum"))?;
+    // Its clock may differ: where the speeds determine by how much, that is taken out.
+    let _ = judgement::take_time_offset_out(&estimate, &mut fixes);
+    let Ok(evaluation) = judgement::judge(&estimate, &fixes) else {
+        return Ok(Check::is_missing(NAME, "the fixes are of different times"));
+    };
+    let (by_radar, by_gnss) = stretches(&estimate, &fixes);
+    if by_gnss.len() < MIN_STRETCHES {
+        return Ok(Check::is_missing(
+            NAME,
+            "the fixes cover too little of the drive",
+        ));
+    }
+    let ratio = by_radar.iter().sum::<f64>() / by_gnss.iter().sum::<f64>();
+    let is_mirrored = evaluation.axes.y_negated;
+    let sense = if is_mirrored { "; MIRRORED" } else { "" };
+    Ok(Check::new(
+        NAME,
+        Some((ratio - 1.0).abs() <= SCALE && !is_mirrored),
+        format!(
+            "the path is {ratio:.4} of that by GNSS{sense}, ATE {:.2} m; 1 +- {SCALE}",
+            evaluation.ate.rmse_m
+        ),
+    ))
+}
+
+/// Returns the distances between the ends of stretches of the path, by both.
+fn stretches(estimate: &Trajectory, fixes: &Trajectory) -> (Vec<f64>, Vec<f64>) {
+    let apart_m = |from: &Pose, to: &Pose| (to.translation.vector - from.translation.vector).norm();
+    let (mut by_radar, mut by_fixes) = (Vec::new(), Vec::new());
+    let mut from: Option<(Pose, Pose)> = None;
+    for (stamp_ns, here) in estimate.stamps().iter().zip(&estimate.poses) {
+        let Some(fix) = fixes
+            .near(*stamp_ns, 500_000_000)
+            .and_then(|_| fixes.at(*stamp_ns))
+        else {
+            from = None;
+            continue;
+        };
+        let (pose, first) = from.get_or_insert((*here, fix));
+        let length_m = apart_m(pose, here);
+        if length_m >= STRETCH_M {
+            by_radar.push(length_m);
+            by_fixes.push(apart_m(first, &fix));
+            from = Some((*here, fix));
+        }
+    }
+    (by_radar, by_fixes)
+}
+
+/// The other sensors beside the scans: the axis of a gyro, and the scale of the wheels.
+fn of_sensors(recorded: &Recorded) -> Result<Vec<Check>, Failure> {
+    let track = recorded.drive.mean_track()?;
+    let mut checks = Vec::new();
+    for sensor in recorded.sensors.iter().flatten() {
+        let (kind, log) = (sensor.kind, &sensor.log);
+        let name = kind.sensor.section();
+        let max_gap_s = sensor.configured.max_gap_s;
+        let found = match calibrate_sensor(kind, &recorded.drive, &track, &log.samples, max_gap_s) {
+            Ok(found) => found,
+            Err(error) => {
+                checks.push(Check::is_missing(name, &error.to_string()));
+                continue;
+            }
+        };
+        let correlation = format!(
+            "correlation {:.4}, scale {:.4}",
+            found.correlation, found.scale.value
+        );
+        checks.push(
+            match (found.up, log.up(sensor.configured.up, recorded.format)) {
+                (Some(up), Ok(expected)) => Check::new(
+                    name,
+                    Some(up == expected),
+                    format!(
+                        "{} turns as the radar, {} points up; {correlation}",
+                        up.name(),
+                        expected.name()
+                    ),
+                ),
+                (Some(_), Err(error)) => Check::new(name, Some(false), error.to_string()),
+                (None, _) => Check::new(
+                    name,
+                    Some((found.scale.value - 1.0).abs() <= WHEELS_SCALE),
+                    format!("{correlation}; 1 +- {WHEELS_SCALE}"),
+                ),
+            },
+        );
+    }
+    Ok(checks)
+}
