@@ -82,6 +82,21 @@ fn evo_finds_the_same_errors_to_the_digit_it_shows() {
 }
 
 #[test]
+fn without_a_ground_truth_a_run_is_compared_with_itself() {
+    for (threshold, code, word) in [("60", 0, "good"), ("90", 1, "BAD: threshold")] {
+        let run = Run::of_recording().set(&format!("masking.threshold={threshold}"));
+        run.complete();
+        let ended = finished!["evaluate", "--alone", run.out()];
+        assert_eq!(ended.status.code(), Some(code), "{ended:?}");
+        let verdict = ended.stdout.lines().last().unwrap();
+        let verdict = verdict.trim_start_matches("verdict").trim();
+        assert!(verdict.starts_with(word), "{ended:?}");
+        // The drive is too short for the constants.
+        assert!(verdict.contains("not determined: constants"), "{ended:?}");
+    }
+}
+
+#[test]
 fn a_table_and_all_plots_come_of_an_odometry() {
     let run = run();
     let plots = run.folder().join("new/plots");

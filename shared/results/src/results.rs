@@ -53,7 +53,8 @@ pub fn write(
     let truth = truth_of(configuration, out.path());
     let mut slam = slam_of(configuration, out);
     let mut files = Files::new(out);
-    let (resumed, is_judged) = (session.resumed, truth.is_some());
+    // Loops are compared with the poses too.
+    let (resumed, is_judged) = (session.resumed, truth.is_some() || slam.is_some());
     let mut read = pass::read(&mut files, out.path(), resumed, is_judged, slam.as_ref())?;
     let mut corrected = None;
     if let Some(slam) = &mut slam {

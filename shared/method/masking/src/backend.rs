@@ -14,7 +14,7 @@ pub enum Backend {
     Auto,
     /// ONNX Runtime, which is opened at run time.
     OnnxRuntime,
-    /// The built-in ones: rten, or for 8-bit integers Gyre itself.
+    /// rten, which is built in.
     Rten,
 }
 

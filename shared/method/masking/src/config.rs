@@ -23,8 +23,7 @@ pub struct MaskingConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
     /// The library that computes the network, and the network of moving objects: `onnxruntime`;
-    /// `rten`, which is built in and slower, and leaves networks of one scan in 8 bits to Gyre
-    /// itself; or `auto`: ONNX Runtime where it is found, else rten.
+    /// `rten`, which is built in and slower; or `auto`: ONNX Runtime where it is found, else rten.
     pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,21 +1,15 @@
-//! A learned mask: a network in ONNX Runtime, in rten, or of 8-bit integers without either.
+//! A learned mask: a network in ONNX Runtime or in rten.
 
-mod integers;
 mod onnx_runtime;
 mod rten;
-mod tensors;
 
 use gyre_radar::raster::RasterConfig;
 use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
-use crate::networks::{
-    planes::{self, guarded},
-    runtime::RuntimeError,
-};
+use crate::networks::{planes, runtime::RuntimeError};
 use crate::{Backend, MaskingConfig, model::Model};
-use integers::Integers;
 
 const INPUT: &str = "scans";
 const OUTPUT: &str = "masks";
@@ -46,25 +40,16 @@ impl NetworkError {
 
 #[derive(Debug)]
 pub struct Network {
-    engine: Engine,
+    engine: planes::Engine,
     masks: Array3<f32>,
-}
-
-#[derive(Debug)]
-enum Engine {
-    Library(planes::Engine),
-    Integers(Integers),
 }
 
 impl Network {
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster).map_err(NetworkError::Model)?;
         let (engine, inputs, outputs) = match config.onnx_runtime()? {
-            Some(path) => {
-                let (engine, inputs, outputs) = onnx_runtime::load(&path, &model, config)?;
-                (Engine::Library(engine), inputs, outputs)
-            }
-            None => built_in(&model)?,
+            Some(path) => onnx_runtime::load(&path, &model, config)?,
+            None => rten::load(&model)?,
         };
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, &inputs, shape, &model)?;
@@ -72,7 +57,7 @@ impl Network {
         let [_, scans, rows, columns] = shape;
         let masks = Array3::zeros((scans, rows, columns));
         let mut network = Self { engine, masks };
-        if let Engine::Library(planes::Engine::Rten(..)) = network.engine {
+        if let planes::Engine::Rten(..) = network.engine {
             let empty = network.masks.clone();
             network.run(empty.view()).map_err(|error| match error {
                 NetworkError::Run(reason) => rten::rejected(&model, &reason),
@@ -95,36 +80,20 @@ impl Network {
         &mut self,
         rasters: ArrayView3<'_, f32>,
     ) -> Result<ArrayView3<'_, f32>, NetworkError> {
-        match &mut self.engine {
-            Engine::Library(engine) => {
-                let (scans, rows, columns) = rasters.dim();
-                let (cells, masks) = (rasters.as_standard_layout(), self.masks.view_mut());
-                let cells = cells.as_slice().unwrap_or_default();
-                let shape = [1, scans, rows, columns];
-                let computed = engine.compute(shape, cells, |_, factors| fill(masks, &factors));
-                computed.map_err(NetworkError::Run)??;
-            }
-            Engine::Integers(engine) => engine.run(rasters, self.masks.view_mut()),
-        }
+        let (scans, rows, columns) = rasters.dim();
+        let (cells, masks) = (rasters.as_standard_layout(), self.masks.view_mut());
+        let cells = cells.as_slice().unwrap_or_default();
+        let shape = [1, scans, rows, columns];
+        let computed = self
+            .engine
+            .compute(shape, cells, |_, factors| fill(masks, &factors));
+        computed.map_err(NetworkError::Run)??;
         Ok(self.masks.view())
     }
 
     pub fn masks(&self) -> ArrayView3<'_, f32> {
         self.masks.view()
     }
-}
-
-/// Loads a model without ONNX Runtime. Returns the engine, and the names of the model's inputs and
-/// outputs.
-fn built_in(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), NetworkError> {
-    let file = rten::parse(model)?;
-    let (inputs, outputs) = (rten::inputs(&file), rten::outputs(&file));
-    let read = |graph| guarded(|| Integers::read(graph).ok_or("it has other steps")).ok();
-    let engine = match file.graph.as_ref().and_then(read) {
-        Some(engine) => Engine::Integers(engine),
-        None => Engine::Library(rten::load(model, file)?),
-    };
-    Ok((engine, inputs, outputs))
 }
 
 fn fill(mut masks: ArrayViewMut3<'_, f32>, computed: &[f32]) -> Result<(), NetworkError> {

@@ -35,7 +35,7 @@ pub struct Read {
 
 /// Reads the journal of a run to its end, which contains `resumed` poses of earlier sessions:
 /// writes the tables row by row, and measures and counts all else. Poses are kept if they are to be
-/// judged.
+/// compared with a ground truth or with loops.
 pub fn read(
     files: &mut Files<'_>,
     out: &Path,

@@ -10,7 +10,7 @@ use crate::{Backend, model::Model};
 /// The newest operator version where the models of `models/` agree with ONNX Runtime.
 const OPSET: i64 = 26;
 
-pub(super) fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
+fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
     let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
         let reason = format!("it is not a model in ONNX, or is damaged: {error}");
         rejected(model, &reason)
@@ -34,16 +34,18 @@ pub(super) fn rejected(model: &Model, reason: &str) -> NetworkError {
     NetworkError::load(Backend::Rten, model, reason)
 }
 
-/// Loads a network into rten. Only when it computes does that find operators that do not fit each
-/// other.
-pub(super) fn load(model: &Model, mut file: ModelProto) -> Result<Engine, NetworkError> {
+/// Loads a network into rten; returns the names of the model's inputs and outputs too. Only when it
+/// computes does rten find operators that do not fit each other.
+pub(super) fn load(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), NetworkError> {
+    let mut file = parse(model)?;
+    let (inputs, outputs) = (inputs(&file), outputs(&file));
     if let Some(graph) = &mut file.graph {
         state_kernel_sizes(graph);
     }
     let rejected = |reason: String| rejected(model, &reason);
     let bytes = guarded(|| file.write_buf()).map_err(rejected)?;
     let network = guarded(|| ModelOptions::with_all_ops().load(bytes)).map_err(rejected)?;
-    Ok(Engine::of_rten(network))
+    Ok((Engine::of_rten(network), inputs, outputs))
 }
 
 fn newest_operators(file: &ModelProto) -> i64 {
@@ -79,7 +81,7 @@ fn state_kernel_sizes(graph: &mut GraphProto) {
     }
 }
 
-pub(super) fn inputs(file: &ModelProto) -> Vec<String> {
+fn inputs(file: &ModelProto) -> Vec<String> {
     let Some(graph) = &file.graph else {
         return Vec::new();
     };
@@ -91,7 +93,7 @@ pub(super) fn inputs(file: &ModelProto) -> Vec<String> {
     inputs.map(describe).collect()
 }
 
-pub(super) fn outputs(file: &ModelProto) -> Vec<String> {
+fn outputs(file: &ModelProto) -> Vec<String> {
     let outputs = file.graph.iter().flat_map(|graph| &graph.output);
     outputs.map(describe).collect()
 }
