@@ -79,7 +79,7 @@ fn give(shared: &Shared, command: Command) -> Done {
         Ok(Some(_)) => (true, "applied to the next scan".to_owned()),
         Ok(None) => (
             true,
-            "no scan has taken it yet: it applies to the next one".to_owned(),
+            "no scan has taken it yet: it applies to the next one, if one comes".to_owned(),
         ),
         Err(error) => (false, error.to_string()),
     };

@@ -79,7 +79,9 @@ fn applied(what: &str, from_ns: Option<i64>) -> Result<(), Failure> {
             "the run {what} from the scan of {:.3} s on",
             from_ns as f64 * 1e-9
         )),
-        None => print::line("no scan has taken the command yet: it applies to the next one"),
+        None => print::line(
+            "no scan has taken the command yet: it applies to the next one, if one comes",
+        ),
     }
 }
 
