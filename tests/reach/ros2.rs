@@ -18,7 +18,7 @@ use serde_json::Value;
 
 use crate::{
     PROJECT,
-    common::{Run, can, gyre, odometry, recording, script},
+    common::{Run, can, gyre, odometry, recording, script, send},
     reach::{only_if, python_has},
     restart::faults::configurations::without_doppler,
 };
@@ -408,6 +408,20 @@ fn a_managed_node_publishes_once_it_is_active() {
     let held_back = "24 poses not published, since the node was not active";
     assert!(said.ends_with(held_back), "{said}");
     assert_odometry(&topics["/car/odom"], &run);
+}
+
+/// The answer to a command waits for a scan.
+#[test]
+fn a_command_that_waits_holds_up_no_other_request() {
+    only_if!(has_ros());
+    let (run, domain) = (Run::of_recording().rate("2"), domain(2));
+    let run = run.set("slam.kind=graph");
+    let _bridge = Program::bridge(&run, &domain, &["--managed"]);
+    let mut node = Program::node(&domain, &["/"]);
+    let mut running = run.started(3);
+    send(running.await_stage("radar-replay"), Signal::STOP);
+    node.write("meanwhile");
+    node.await_words("{\"topic\": \"still waits\", \"message\": true}");
 }
 
 #[test]

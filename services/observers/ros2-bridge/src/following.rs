@@ -195,6 +195,11 @@ fn sentence(state: &RunState) -> String {
     );
     for (count, reason) in [
         (state.unread, "published while odom had no reader"),
+        (state.predictions.published, "between scans published"),
+        (
+            state.poses.left_out,
+            "not published, since a prediction was ahead of them",
+        ),
         (
             state.poses.held_back,
             "not published, since the node was not active",
@@ -253,11 +258,12 @@ impl PoseTopics {
         }
         shared.state().unsent += unsent;
         // A prediction is ahead of the next scan.
-        if self
+        match self
             .predicted_ns
-            .is_none_or(|predicted_ns| predicted_ns < stamp_ns)
+            .is_some_and(|ahead_ns| ahead_ns >= stamp_ns)
         {
-            self.send(shared, pose, stamp_ns, map_from_odometry.as_ref());
+            true => shared.state().poses.leave_out(),
+            false => self.send(shared, pose, stamp_ns, map_from_odometry.as_ref()),
         }
     }
 
@@ -279,7 +285,7 @@ impl PoseTopics {
         };
         // Nothing is predicted where a chain starts: the prediction is of the chain before.
         let Some(last) = self.last.filter(|last| !last.item.is(flag::BREAK)) else {
-            return;
+            return shared.state().predictions.leave_out();
         };
         let pose = PoseHeader {
             x_m: predicted.x_m,
@@ -393,6 +399,6 @@ fn publish_some<M: Serialize>(
             let is_sent = topic.send(message);
             shared.state().unsent += u64::from(!is_sent);
         }
-        None => counts(&mut state).was_empty(),
+        None => counts(&mut state).leave_out(),
     }
 }
