@@ -133,8 +133,8 @@ impl Control {
     }
 
     /// Gives the run a command, and waits for its first scan. Returns the time of that scan, ns on
-    /// the sensor's clock; `None` if no scan has taken it: it then applies to the next one. It is an
-    /// error if the run has ended before.
+    /// the sensor's clock; `None` if no scan has taken it: it then applies to the next one. If
+    /// the run has ended before, that is an error.
     pub fn command(&self, command: Command) -> Result<Option<i64>, RunError> {
         let number = match self.ask(&Request::Command(command), NOT_LATER)? {
             Answer::Numbered(number) => number,
