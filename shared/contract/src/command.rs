@@ -179,26 +179,20 @@ impl Commands {
 
     /// Returns the number of commands that no scan has taken: the last ones.
     pub fn waiting(&self) -> u64 {
-        self.len() - self.taken().count() as u64
-    }
-
-    fn taken(&self) -> impl Iterator<Item = (Command, i64)> {
-        let timed = self
-            .given
-            .iter()
-            .map(|(command, ns)| Some((*command, (*ns)?)));
-        timed.map_while(|it| it)
+        let last = self.given.iter().rev();
+        last.take_while(|(_, from_ns)| from_ns.is_none()).count() as u64
     }
 
     /// Writes the commands that scans have taken to the folder of another run, which applies each
     /// from the same time on.
     pub fn give(&self, out: &Path) -> Result<(), CommandError> {
         let mut text = String::new();
-        for (number, (command, from_ns)) in (1..).zip(self.taken()) {
+        let taken = 1..=self.len() - self.waiting();
+        for (number, &(command, from_ns)) in taken.zip(&self.given) {
             text += &self.text(&Line {
                 number,
                 command: Some(command),
-                from_ns: Some(from_ns),
+                from_ns,
             })?;
         }
         let written = gyre_storage::write(&out.join(FILE), text);
@@ -291,10 +285,9 @@ impl Commands {
     /// have no time yet apply from this scan on.
     pub fn apply(&mut self, stamp_ns: i64, takes_new: bool) -> Result<u64, CommandError> {
         self.refresh()?;
-        let without_time = |it: &Self| (1..=it.len()).find(|number| it.from_ns(*number).is_none());
-        while let Some(number) = without_time(self).filter(|_| takes_new) {
+        while takes_new && self.waiting() > 0 {
             let appended = self.append(&Line {
-                number,
+                number: self.len() - self.waiting() + 1,
                 command: None,
                 from_ns: Some(stamp_ns),
             });

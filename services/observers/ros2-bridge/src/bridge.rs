@@ -40,8 +40,8 @@ impl Bridge {
         })
     }
 
-    /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
-    pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), RunError> {
+    /// Publishes until a signal arrives.
+    pub fn publish(mut self, signals: &Signals) -> Result<(), RunError> {
         let (shared, services, topics) = (&self.shared, self.services, self.topics.of_run);
         let mounted = shared.settings.vehicle.mounted(clock::since_1970_ns());
         self.topics.mounting.send(mounted);
@@ -51,7 +51,7 @@ impl Bridge {
                 threads.spawn(move || services.run(shared).inspect_err(|_| shared.stop()))
             };
             let served: Vec<_> = services.into_iter().map(serve).collect();
-            threads.spawn(|| follow_runs(shared, topics, say));
+            threads.spawn(|| follow_runs(shared, topics));
             threads.spawn(|| report(shared, self.topics.diagnostics));
             let mut stopped = Ok(false);
             while let Ok(false) = stopped

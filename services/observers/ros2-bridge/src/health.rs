@@ -152,7 +152,7 @@ fn process(process: &ProcessStatus) -> DiagnosticStatus {
 
 #[cfg(test)]
 mod tests {
-    use gyre_contract::control::{Phase, Received, SensorClock};
+    use gyre_contract::control::{Received, SensorClock};
 
     use super::*;
 
@@ -171,23 +171,12 @@ mod tests {
             received: None,
         };
         Status {
-            pid: 1,
-            out: "out".into(),
-            started_in: "/".into(),
-            live: true,
-            phase: Phase::Running,
-            uptime_s: 2.0,
-            published: Some(9),
-            poses: 8,
             dropped,
-            last_pose_s: Some(0.1),
-            notice: None,
-            disk_is_full: false,
-            swap: None,
             processes: vec![
                 process("masking", Activity::Working),
                 process("refinement", Activity::Silent),
             ],
+            ..Status::default()
         }
     }
 

@@ -157,6 +157,16 @@ impl Shared {
         self.stopping.store(true, Ordering::Relaxed);
     }
 
+    /// Passes a sentence to the terminal.
+    pub fn say(&self, sentence: &str) {
+        (self.settings.say)(sentence);
+    }
+
+    /// Counts a message that was not sent.
+    pub fn sent(&self, is_sent: bool) {
+        self.state().unsent += u64::from(!is_sent);
+    }
+
     pub fn is_stopping(&self) -> bool {
         self.stopping.load(Ordering::Relaxed)
     }

@@ -2,6 +2,7 @@
 //! [`topics`](crate::topics).
 
 use gyre_client::{RunError, wait_for_readable};
+use gyre_ros2_messages::lifecycle_msgs::State;
 use ros2_client::Message;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -23,6 +24,11 @@ impl<T: Serialize + DeserializeOwned> Message for Wire<T> {}
 /// A request without content: it has a byte.
 #[derive(Clone, Serialize, Deserialize)]
 struct Empty(u8);
+
+fn state(shared: &Shared) -> State {
+    let lifecycle = shared.lifecycle.as_ref();
+    lifecycle.map(Lifecycle::state).unwrap_or_default()
+}
 
 /// Answers all requests to a service, or takes all messages of a topic, that have arrived.
 type Serve = Box<dyn Fn(&Shared) + Send>;
@@ -75,28 +81,18 @@ impl Services {
             lifecycle.is_some_and(|it| it.change(&wanted))
         })?;
         services.add(node, "get_state", of("GetState"), |shared, Empty(_)| {
-            shared
-                .lifecycle
-                .as_ref()
-                .map(Lifecycle::state)
-                .unwrap_or_default()
+            state(shared)
         })?;
         let states = of("GetAvailableStates");
         services.add(node, "get_available_states", states, |_, Empty(_)| {
             lifecycle::states()
         })?;
-        let transitions = of("GetAvailableTransitions");
-        services.add(
-            node,
-            "get_available_transitions",
-            transitions,
-            |shared, Empty(_)| {
-                let state = shared.lifecycle.as_ref().map(Lifecycle::state);
-                let mut available = lifecycle::transitions();
-                available.retain(|it| Some(&it.start_state) == state.as_ref());
-                available
-            },
-        )?;
+        let (name, transitions) = ("get_available_transitions", of("GetAvailableTransitions"));
+        services.add(node, name, transitions, |shared, Empty(_)| {
+            let mut available = lifecycle::transitions();
+            available.retain(|it| it.start_state == state(shared));
+            available
+        })?;
         services.add(node, "get_transition_graph", transitions, |_, Empty(_)| {
             lifecycle::transitions()
         })?;
