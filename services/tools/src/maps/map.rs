@@ -50,10 +50,7 @@ pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
 
 fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let mut keyframes = open(&arguments.run)?;
-    let poses = match &arguments.trajectory {
-        Some(other) => Poses::of_other(other)?,
-        None => Poses::of_run(&arguments.run)?,
-    };
+    let poses = Poses::read(&arguments.run, arguments.trajectory.as_ref())?;
     let loops = placing::used_loops(&arguments.run)?;
     let configuration = configuration(&arguments.run)?;
     let _locked = Out::lock_for(&arguments.out, Content::MAP)?;
@@ -84,7 +81,7 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
 /// name.
 pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Failure> {
     let mut keyframes = open(run)?;
-    let poses = Poses::of_run(run)?;
+    let poses = Poses::read(run, None)?;
     let mut evidence = Evidence::new(&map_options(&configuration(run)?), folder)?;
     for index in 0..keyframes.len() {
         let keyframe = keyframes.read(index)?;

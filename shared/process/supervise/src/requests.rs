@@ -84,7 +84,7 @@ impl Supervisor<'_> {
         let (slam, localises) = (manifest.window.slam, manifest.window.localises);
         let missing = match command {
             _ if self.followers.are_awaited => {
-                Some("the last scan has passed: none takes a command")
+                Some("the last scan has passed: no scan takes a command")
             }
             _ if !self.run.plan.takes_commands => {
                 Some("commands need masking and pose-integration in one run: here one is absent")

@@ -18,23 +18,20 @@ pub struct Poses {
 }
 
 impl Poses {
-    pub fn of_run(run: &Path) -> Result<Self, Failure> {
-        let path = trajectory_of(run);
-        let poses = read_trajectory_of_run(&path)?.poses;
-        let numbers = (0..).take(poses.len()).collect();
+    /// Reads the trajectory of a run, or another one of the same drive, which has times.
+    pub fn read(run: &Path, other: Option<&PathBuf>) -> Result<Self, Failure> {
+        let path = other.cloned().unwrap_or_else(|| trajectory_of(run));
+        let trajectory = match other {
+            Some(_) => read_trajectory(&path)?,
+            None => {
+                let poses = read_trajectory_of_run(&path)?.poses;
+                Trajectory::timed((0..).take(poses.len()).collect(), poses)
+            }
+        };
         Ok(Self {
-            trajectory: Trajectory::timed(numbers, poses),
             path,
-            is_of_run: true,
-        })
-    }
-
-    /// Another trajectory of the same drive, by time.
-    pub fn of_other(path: &Path) -> Result<Self, Failure> {
-        Ok(Self {
-            trajectory: read_trajectory(path)?,
-            path: path.to_owned(),
-            is_of_run: false,
+            trajectory,
+            is_of_run: other.is_none(),
         })
     }
 
@@ -47,11 +44,12 @@ impl Poses {
     }
 
     pub fn of(&self, keyframe: &Keyframe) -> Option<Pose> {
-        let key = self.key(keyframe);
-        match self.is_of_run {
-            true => self.trajectory.at(key),
-            false => self.trajectory.near(key, Trajectory::ROUNDING_NS),
-        }
+        let rounding_ns = if self.is_of_run {
+            0
+        } else {
+            Trajectory::ROUNDING_NS
+        };
+        self.trajectory.near(self.key(keyframe), rounding_ns)
     }
 
     /// Returns the poses from the first to the last keyframe, by their keys: a ground truth may be
