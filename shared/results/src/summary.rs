@@ -144,7 +144,7 @@ pub struct Summary {
     course: Course,
     #[serde(flatten)]
     counts: Counts,
-    /// Commands that no scan has taken, since the last one had passed; `None`: scans have taken all.
+    /// Commands that no scan has taken, after the last one; `None`: they have taken all.
     #[serde(skip_serializing_if = "Option::is_none")]
     commands_without_scan: Option<u64>,
     wall_s: f64,
