@@ -326,8 +326,9 @@ fn a_node_of_ros_gives_a_running_run_a_pose_a_new_map_and_a_reset() {
     let places: Vec<[f64; 2]> = places
         .map(|it| ["x", "y"].map(|axis| number(&it[axis])))
         .collect();
-    let given = places.iter().position(|it| *it == [40.0, -30.0]);
-    let reset = places.iter().rposition(|it| *it == [0.0, 0.0]);
+    let is_at = |it: &[f64; 2], x: f64, y: f64| (it[0] - x).hypot(it[1] - y) < 1e-9;
+    let given = places.iter().position(|it| is_at(it, 40.0, -30.0));
+    let reset = places.iter().rposition(|it| is_at(it, 0.0, 0.0));
     assert!(given > Some(0) && reset > given, "{places:?}");
 }
 
