@@ -10,6 +10,7 @@ use crate::{
         recording::{self, MIDDLE},
         undisturbed,
     },
+    live::radar::{Radar, run_at},
     restart::results::interrupted,
 };
 use gyre_journal::Journal;
@@ -104,6 +105,16 @@ fn a_map_that_was_lost_soon_after_the_start_lets_the_run_begin_anew() {
     damage(&run);
     run.finish().succeeded().says("knows none of the");
     assert_eq!(run.odometry(), undisturbed());
+
+    let radar = Radar::playing(recording::small(), &["--repeat"]);
+    let run = run_at(&radar.address).set("slam.kind=graph");
+    run.started(3).interrupt();
+    for lost in ["refinement.map", "keyframes.log"] {
+        fs::remove_file(run.out().join("journal").join(lost)).unwrap();
+    }
+    let mut again = run.start();
+    again.await_stages();
+    again.interrupt().says("knows none of the");
 }
 
 #[test]

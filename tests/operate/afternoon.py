@@ -1,4 +1,4 @@
-"""An afternoon of a robot, in minutes: it boots before its radar, loses it, is reset, killed and upgraded, starts in its map, and each pose is
+"""An afternoon of a robot, in minutes: it boots before its radar, loses it, fills its log, is reset, killed and upgraded, starts in its map, and each pose is
 accounted for at the end.
 
     afternoon.py GYRE FOLDER
@@ -89,9 +89,10 @@ def finished(place):
     with open(f"{place}/summary.json") as file:
         summary = json.load(file)
     with open(f"{place}/trajectory.tum") as file:
-        lines = len(file.read().splitlines())
+        stamps = [float(line.split()[0]) for line in file]
     counts = {name: summary.get(name, 0) for name in ("published", "processed", "dropped", "breaks", "commands")}
-    assert counts["processed"] == lines, (place, counts, lines)
+    assert counts["processed"] == len(stamps), (place, counts, len(stamps))
+    counts["steps back"] = sum(later < earlier for earlier, later in zip(stamps, stamps[1:]))
     assert counts["published"] == counts["processed"] + counts["dropped"], (place, counts)
     return counts
 
@@ -109,6 +110,13 @@ try:
     radar_on()
     await_poses(10)
     report("has it again, with a clock that has stepped back", poses=status()["poses"])
+
+    log = f"{out}/log.jsonl"
+    with open(log, "r+") as file:
+        lines = file.read()
+        file.write(lines * ((9 << 20) // len(lines)))
+    until("a short log", lambda: os.path.getsize(log) < 1 << 20)
+    report("has turned its log over", kept=os.path.getsize(f"{log}.old"))
 
     report(call("reset", out, "--pose", "5,2,90", "--keep-map").strip())
     await_poses(5)
@@ -135,7 +143,10 @@ try:
     report("is upgraded", says=up(program))
     await_poses(60)
     [closed] = [name for name in os.listdir(folder) if name.startswith("out.")]
-    report("the run before is closed", folder=closed, **finished(f"{folder}/{closed}"))
+    counts = finished(f"{folder}/{closed}")
+    assert counts["steps back"] > 0, counts
+    report("the run before is closed", folder=closed, **counts)
+    report(call("map", closed, "--format=folder", "--out", "map-before").strip())
 
     call("down", out)
     call("map", out, "--format=folder", "--out", f"{folder}/map")

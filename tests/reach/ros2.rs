@@ -18,7 +18,7 @@ use serde_json::Value;
 
 use crate::{
     PROJECT,
-    common::{Run, can, gyre, odometry, recording, script},
+    common::{Run, can, gyre, odometry, recording, script, send},
     reach::{only_if, python_has},
     restart::faults::configurations::without_doppler,
 };
@@ -326,8 +326,9 @@ fn a_node_of_ros_gives_a_running_run_a_pose_a_new_map_and_a_reset() {
     let places: Vec<[f64; 2]> = places
         .map(|it| ["x", "y"].map(|axis| number(&it[axis])))
         .collect();
-    let given = places.iter().position(|it| *it == [40.0, -30.0]);
-    let reset = places.iter().rposition(|it| *it == [0.0, 0.0]);
+    let is_at = |it: &[f64; 2], x: f64, y: f64| (it[0] - x).hypot(it[1] - y) < 1e-9;
+    let given = places.iter().position(|it| is_at(it, 40.0, -30.0));
+    let reset = places.iter().rposition(|it| is_at(it, 0.0, 0.0));
     assert!(given > Some(0) && reset > given, "{places:?}");
 }
 
@@ -408,6 +409,20 @@ fn a_managed_node_publishes_once_it_is_active() {
     let held_back = "24 poses not published, since the node was not active";
     assert!(said.ends_with(held_back), "{said}");
     assert_odometry(&topics["/car/odom"], &run);
+}
+
+/// The answer to a command waits for a scan.
+#[test]
+fn a_command_that_waits_holds_up_no_other_request() {
+    only_if!(has_ros());
+    let (run, domain) = (Run::of_recording().rate("2"), domain(2));
+    let run = run.set("slam.kind=graph");
+    let _bridge = Program::bridge(&run, &domain, &["--managed"]);
+    let mut node = Program::node(&domain, &["/"]);
+    let mut running = run.started(3);
+    send(running.await_stage("radar-replay"), Signal::STOP);
+    node.write("meanwhile");
+    node.await_words("{\"topic\": \"still waits\", \"message\": true}");
 }
 
 #[test]

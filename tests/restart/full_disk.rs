@@ -1,11 +1,13 @@
 //! A full disk: the exit code and, if it can be written, a sentence report the cause; nothing
 //! panics.
 
-use std::{fs::File, path::Path, process::Command};
+use std::{fs::File, path::Path, process::Command, thread::sleep, time::Duration};
+
+use rustix::process::Signal;
 
 use crate::{
     common::{
-        Ended, Run, Running, can_mount, entries_of, gyre, odometry, recording, undisturbed,
+        Ended, Run, Running, can_mount, entries_of, gyre, odometry, recording, send, undisturbed,
         with_tmpfs, wrapped,
     },
     live::radar::{Radar, run_at},
@@ -113,6 +115,15 @@ fn poses_on_a_full_disk_are_written_when_there_is_room_again() {
     await_status(&run, "room on the disk", |status| {
         status["disk_is_full"] == false
     });
+    // At a stop a process has time for what it has held, also on a disk that is slow.
+    mount.fill(0);
+    await_held(&run, &running, 3);
+    let holder = running.await_stage("pose-integration");
+    send(holder, Signal::STOP);
+    mount.free();
+    running.signal(Signal::INT);
+    sleep(Duration::from_secs(4));
+    send(holder, Signal::CONT);
     running.interrupt();
     run.assert_counts("breaks=0");
     let rows = odometry::rows(&run.odometry());
@@ -140,6 +151,29 @@ fn a_live_run_begins_again_behind_its_journal_if_poses_of_a_full_disk_are_lost()
         running.interrupt();
         run.assert_counts("breaks=1");
     }
+}
+
+#[test]
+fn a_run_that_loses_poses_ends_when_it_is_asked_to() {
+    if !can_mount() {
+        return;
+    }
+    let script = "trap '' TERM; test -e $0.late && sleep 1; exec {gyre} stage pose-integration";
+    let radar = Radar::playing(recording::small(), &["--repeat"]);
+    let run = run_at(&radar.address).stage_script("pose-integration", script);
+    let mount = Mount::tmpfs(run.out(), PLENTY);
+    let mut running = run.started(4);
+    mount.fill(0);
+    await_held(&run, &running, 2);
+    let script = run.folder().join("pose-integration.sh");
+    File::create(script.with_extension("sh.late")).unwrap();
+    running.kill("pose-integration");
+    running.await_child(script.to_str().unwrap(), None);
+    ask(&run, &["down"]);
+    let ended = running.finish();
+    ended
+        .does_not_say("starting over")
+        .failed_with(&["are lost"]);
 }
 
 #[test]

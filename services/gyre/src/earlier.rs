@@ -302,16 +302,16 @@ fn known_poses(
     match known {
         Some(poses) => Ok(poses),
         // A new chain of motions begins, without the old map.
-        None if configuration.is_radar() => {
+        None if configuration.is_radar() && complete > 0 => {
             print::note(format_args!(
                 "gyre: {} has no state of pose {}, as after a full disk: the filters of other sensors start again",
                 path.display(),
-                complete.saturating_sub(1)
+                complete - 1
             ));
             Ok(complete)
         }
         // Not more than a power failure can take, soon after the start.
-        None if content.poses <= 2 * GroupSync::LIMIT => {
+        None if configuration.is_radar() || content.poses <= 2 * GroupSync::LIMIT => {
             print::note(format_args!(
                 "gyre: {} knows none of the {} poses of the journal: starting again",
                 path.display(),

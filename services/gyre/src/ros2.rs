@@ -40,6 +40,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<(), Failure> {
         map: !arguments.no_map,
         clock: arguments.clock,
         is_managed: arguments.managed,
+        say: |sentence| print::note(format_args!("gyre: {sentence}")),
         of_run: run_settings,
     })?;
     let signals = Signals::install()?;
@@ -53,10 +54,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<(), Failure> {
             "gyre: whoever is on this network can read it, and DDS carries it unencrypted; --interface 127.0.0.1 keeps it on this computer",
         );
     }
-    bridge.publish(&signals, |sentence| {
-        print::note(format_args!("gyre: {sentence}"));
-    })?;
-    Ok(())
+    Ok(bridge.publish(&signals)?)
 }
 
 /// Returns the topics of ROS 2 with the samples of a run's other sensors.

@@ -99,8 +99,8 @@ struct Ready {
     resolved: Configuration,
     checked: Preflight,
     identity: Identity,
-    /// The text of the commands that the run is given at its begin.
-    commands: Option<String>,
+    /// The commands that the run is given at its begin.
+    commands: Option<Commands>,
     /// True if the run continues its own earlier recording.
     recording_goes_on: bool,
 }
@@ -211,21 +211,20 @@ fn play(
 }
 
 /// Reads the commands that another run has had.
-fn commands(configuration: &Configuration) -> Result<Option<String>, Failure> {
+fn commands(configuration: &Configuration) -> Result<Option<Commands>, Failure> {
     let Some(path) = &configuration.source.commands else {
         return Ok(None);
     };
-    let text = storage::read_text(path, storage::SETTINGS);
-    let text = text.map_err(|error| format!("{} (source.commands): {error}", path.display()))?;
+    let shown = path.display();
+    storage::open(path).map_err(|error| format!("{shown} (source.commands): {error}"))?;
     let commands = Commands::read(path)?;
-    match (1..=commands.len()).find(|number| commands.from_ns(*number).is_none()) {
-        Some(number) => Err(format!(
-            "{} (source.commands): command {number} lacks the time of its first scan (from_ns)",
-            path.display()
-        )
-        .into()),
-        None => Ok(Some(text)),
+    let (waiting, all) = (commands.waiting(), commands.len());
+    if waiting > 0 {
+        print::note(format_args!(
+            "gyre: {waiting} of {all} commands of {shown} (source.commands) are left out, since no scan has taken them (from_ns is missing)"
+        ));
     }
+    Ok(Some(commands))
 }
 
 fn prepare(
@@ -240,7 +239,7 @@ fn prepare(
             let resolved = configuration.to_toml()?;
             earlier::begin(out, &ready.identity, &resolved, ready.recording_goes_on)?;
             if let Some(commands) = &ready.commands {
-                storage::write(&Commands::path_in(out.path()), commands)?;
+                commands.give(out.path())?;
             }
         }
     }

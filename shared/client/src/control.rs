@@ -133,7 +133,8 @@ impl Control {
     }
 
     /// Gives the run a command, and waits for its first scan. Returns the time of that scan, ns on
-    /// the sensor's clock; `None` if no scan has taken it: it then applies to the next one.
+    /// the sensor's clock; `None` if no scan has taken it: it then applies to the next one. If
+    /// the run has ended before, that is an error.
     pub fn command(&self, command: Command) -> Result<Option<i64>, RunError> {
         let number = match self.ask(&Request::Command(command), NOT_LATER)? {
             Answer::Numbered(number) => number,
@@ -148,7 +149,13 @@ impl Control {
             }
             thread::sleep(APPLIED_LOOK);
         }
-        Ok(None)
+        match self.is_there() {
+            true => Ok(None),
+            false => Err(RunError::Input(
+                "the run has ended, and no scan has taken the command: it is not applied"
+                    .to_owned(),
+            )),
+        }
     }
 
     /// Returns whether the run is still there: its supervisor lives, and has not written all

@@ -177,6 +177,28 @@ impl Commands {
         self.given.get(index)?.1
     }
 
+    /// Returns the number of commands that no scan has taken: the last ones.
+    pub fn waiting(&self) -> u64 {
+        let last = self.given.iter().rev();
+        last.take_while(|(_, from_ns)| from_ns.is_none()).count() as u64
+    }
+
+    /// Writes the commands that scans have taken to the folder of another run, which applies each
+    /// from the same time on.
+    pub fn give(&self, out: &Path) -> Result<(), CommandError> {
+        let mut text = String::new();
+        let taken = 1..=self.len() - self.waiting();
+        for (number, &(command, from_ns)) in taken.zip(&self.given) {
+            text += &self.text(&Line {
+                number,
+                command: Some(command),
+                from_ns,
+            })?;
+        }
+        let written = gyre_storage::write(&out.join(FILE), text);
+        written.map_err(|error| self.failed(io::Error::other(error)))
+    }
+
     /// Returns the commands with the numbers after `before` up to `until`.
     pub fn between(&self, before: u64, until: u64) -> impl Iterator<Item = &Command> {
         let count = until.saturating_sub(before) as usize;
@@ -263,10 +285,9 @@ impl Commands {
     /// have no time yet apply from this scan on.
     pub fn apply(&mut self, stamp_ns: i64, takes_new: bool) -> Result<u64, CommandError> {
         self.refresh()?;
-        let without_time = |it: &Self| (1..=it.len()).find(|number| it.from_ns(*number).is_none());
-        while let Some(number) = without_time(self).filter(|_| takes_new) {
+        while takes_new && self.waiting() > 0 {
             let appended = self.append(&Line {
-                number,
+                number: self.len() - self.waiting() + 1,
                 command: None,
                 from_ns: Some(stamp_ns),
             });
@@ -288,11 +309,14 @@ impl Commands {
     }
 
     fn append(&mut self, line: &Line) -> Result<(), CommandError> {
-        let mut text = serde_json::to_string(line).map_err(|error| self.failed(error.into()))?;
-        text.push('\n');
-        self.append_text(&text)
+        self.append_text(&self.text(line)?)
             .map_err(|error| self.failed(error))?;
         self.refresh()
+    }
+
+    fn text(&self, line: &Line) -> Result<String, CommandError> {
+        let text = serde_json::to_string(line).map_err(|error| self.failed(error.into()))?;
+        Ok(text + "\n")
     }
 
     fn append_text(&self, text: &str) -> io::Result<()> {
@@ -406,6 +430,14 @@ mod tests {
         // The clock steps back.
         supervisor.add(RESET).unwrap();
         assert_eq!(masking.apply(150, true).unwrap(), 2);
+
+        supervisor.add(RESET).unwrap();
+        assert_eq!(supervisor.waiting(), 1);
+        let other = self::folder();
+        supervisor.give(other.path()).unwrap();
+        let mut replay = Commands::open(other.path()).unwrap();
+        assert_eq!((replay.len(), replay.waiting()), (2, 0));
+        assert_eq!([140, 150].map(|ns| replay.apply(ns, true).unwrap()), [0, 2]);
     }
 
     #[test]

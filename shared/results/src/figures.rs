@@ -89,6 +89,7 @@ pub static GROUPS: LazyLock<[Group; 5]> = LazyLock::new(|| [
         unusual("scans unreadable", "/unreadable"),
         unusual("scans missing in the recording", "/missing"),
         unusual("breaks, where the path starts again", "/breaks"),
+        unusual("commands that came after the last scan", "/commands_without_scan"),
         unusual("azimuths lost, which are put back", "/lost/azimuths"),
         unusual("of them at unknown places", "/lost/unplaced"),
         count("motions refined", "/motions/refined"),

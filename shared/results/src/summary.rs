@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
 use gyre_contract::{
-    Commands, Footprint, StageId,
+    CommandError, Commands, Footprint, StageId,
     run::{
         Ending, Mode, Rate, Report, StageCounters, Swapped,
         latency::{Latency, Percentiles},
@@ -95,16 +95,16 @@ fn problem(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Op
     Some(sentence)
 }
 
-/// Returns why commands have changed nothing.
-fn unapplied(out: &Path, counts: &Counts) -> Option<String> {
-    let given = match Commands::open(out) {
-        Ok(commands) => commands.len(),
+/// Returns why commands with a first scan have changed nothing.
+fn unapplied(commands: &Result<Commands, CommandError>, counts: &Counts) -> Option<String> {
+    let given = match commands {
+        Ok(commands) => commands.len() - commands.waiting(),
         Err(error) => return Some(error.to_string()),
     };
     let applied = counts.commands.unwrap_or_default();
     (applied < given).then(|| {
         format!(
-            "{applied} of {given} commands have changed poses: no scan has come since, or the others are of times after the last scan"
+            "{applied} of {given} commands have changed poses: the others are of times after the last scan"
         )
     })
 }
@@ -144,6 +144,9 @@ pub struct Summary {
     course: Course,
     #[serde(flatten)]
     counts: Counts,
+    /// Commands that no scan has taken, after the last one; `None`: they have taken all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    commands_without_scan: Option<u64>,
     wall_s: f64,
     scans_per_s: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -201,9 +204,10 @@ impl Summary {
             || session.ending.is_some() && configuration.is_radar();
         let (counts, gnss) = (&measured.counts, measured.gnss.as_ref());
         let of_sensors = || sensors::problem(configuration, counts, gnss);
+        let commands = Commands::open(out);
         let problem = problem(&configuration.data(), out, session, counts)
             .or_else(|| of_sensors().filter(|_| has_ended))
-            .or_else(|| unapplied(out, counts).filter(|_| has_ended));
+            .or_else(|| unapplied(&commands, counts).filter(|_| has_ended));
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         let recovery = report.into_iter().flat_map(|report| &report.recovery);
         Self {
@@ -221,6 +225,7 @@ impl Summary {
             resumed_after: session.resumed,
             course: measured.course,
             counts: measured.counts,
+            commands_without_scan: commands.ok().map(|it| it.waiting()).filter(|it| *it > 0),
             wall_s,
             scans_per_s: measured.latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
             shared_memory: session.footprint.cloned(),

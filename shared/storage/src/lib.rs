@@ -22,10 +22,12 @@ mod records;
 pub mod shipped;
 
 use std::{
+    fs::OpenOptions,
     io,
     path::{Path, PathBuf},
 };
 
+use rustix::fs::{FallocateFlags, fallocate};
 use thiserror::Error;
 
 pub use draft::{Draft, is_draft, write};
@@ -48,10 +50,22 @@ pub fn is_full(error: &io::Error) -> bool {
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }
 
-/// Returns whether the disk of a folder, which was full, has room again.
+/// Returns whether the disk of a folder, which was full, has room again, also within the quota of
+/// the user.
 #[must_use]
 pub fn has_room(folder: &Path) -> bool {
     free_bytes(folder).is_none_or(|bytes| bytes >= ROOM)
+        && !matches!(take_room(folder), Err(error) if is_full(&error))
+}
+
+/// Takes the room for a moment. An error of another kind than a full disk answers nothing: not all
+/// file systems can do it.
+fn take_room(folder: &Path) -> io::Result<()> {
+    let path = folder.join(".room.tmp");
+    let file = OpenOptions::new().create(true).append(true).open(&path)?;
+    let taken = fallocate(&file, FallocateFlags::empty(), 0, ROOM);
+    let _ = std::fs::remove_file(&path);
+    Ok(taken?)
 }
 
 /// Returns the bytes that a user may still write to the disk of a folder.

@@ -6,8 +6,8 @@
 use std::sync::{Arc, atomic::AtomicBool};
 
 use gyre_storage::{
-    Disk, LogMagic, Record, RecordLog, RecordReader, continue_when_full, disk, records_path,
-    was_full,
+    Disk, LogMagic, Record, RecordLog, RecordReader, continue_when_full, disk, has_room,
+    records_path, was_full,
 };
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use signal_hook::{consts::SIGXFSZ, flag::register};
@@ -60,7 +60,9 @@ fn writes_to_a_full_disk_are_made_in_their_order_when_there_is_room_again() {
     assert_eq!(numbers(&out), [0]);
     log.sync().unwrap();
     assert_eq!(numbers(&out), [0], "the limit is still there");
+    assert!(!has_room(out.path()), "as with a quota");
     limit(None);
+    assert!(has_room(out.path()));
     log.sync().unwrap();
     assert_eq!(disk(), Disk::HasRoom);
     let expected: Vec<u8> = (0..=100).collect();

@@ -2,7 +2,6 @@
 
 use std::{
     fs::{self, OpenOptions},
-    io::Write,
     os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
 };
@@ -85,9 +84,24 @@ pub fn options() -> OpenOptions {
     options
 }
 
+/// Replaces a file as a whole: if there is no room for it, it stays as it is.
 pub fn write(path: PathBuf, text: &str) -> Result<(), RunError> {
-    let opened = options().write(true).truncate(true).open(&path);
-    opened
-        .and_then(|mut file| file.write_all(text.as_bytes()))
-        .map_err(RunError::file(&path))
+    let written = gyre_storage::write(&path, text);
+    written.map_err(|error| RunError::file(&path)(error.source))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_a_run_is_replaced_as_a_whole() {
+        let root = tempfile::tempdir().unwrap();
+        let [notice, before] = ["notice", "before"].map(|name| root.path().join(name));
+        write(notice.clone(), "first").unwrap();
+        fs::hard_link(&notice, &before).unwrap();
+        write(notice.clone(), "second").unwrap();
+        let read = [notice, before].map(|path| fs::read_to_string(path).unwrap());
+        assert_eq!(read, ["second", "first"]);
+    }
 }

@@ -46,6 +46,12 @@ pub fn let_signals_end_the_process() -> Result<(), RunError> {
     Ok(())
 }
 
+/// Requests a stop of this process, as SIGTERM does: all its [`Signals`] report it.
+pub fn request_stop() -> Result<(), RunError> {
+    signal_hook::low_level::raise(consts::SIGTERM)
+        .map_err(|error| RunError::transport("request a stop", error))
+}
+
 const STOP: [i32; 3] = [consts::SIGTERM, consts::SIGINT, consts::SIGHUP];
 
 #[derive(Debug)]

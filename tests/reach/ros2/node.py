@@ -2,7 +2,8 @@
 
 Arguments: the namespace of the run, and `sim` for a node with `use_sim_time`. Domain and network are those of ROS_DOMAIN_ID and
 ROS_AUTOMATIC_DISCOVERY_RANGE. The first line is `{"ready": true}` once there is odometry; a line `lifecycle` of the input takes a managed node
-through its states, a line `commands` gives the run a pose, a new map and a reset. Odometry is also read as sensor data is, on the topic `sensor`; the topic `now` has the time of the node at each of its messages.
+through its states, a line `commands` gives the run a pose, a new map and a reset, and `meanwhile` asks
+for a state while a command waits. Odometry is also read as sensor data is, on the topic `sensor`; the topic `now` has the time of the node at each of its messages.
 """
 
 import json
@@ -88,10 +89,14 @@ subscribe(TransitionEvent, namespace + "/gyre/transition_event")
 clients = {}
 
 
-def ask(kind, name, **fields):
+def call(kind, name, **fields):
     client = clients.get(name) or clients.setdefault(name, node.create_client(kind, f"{namespace}/gyre/{name}"))
     assert client.wait_for_service(10), name
-    answer = client.call_async(kind.Request(**fields))
+    return client.call_async(kind.Request(**fields))
+
+
+def ask(kind, name, **fields):
+    answer = call(kind, name, **fields)
     rclpy.spin_until_future_complete(node, answer, timeout_sec=10)
     show(name, plain(answer.result()))
 
@@ -118,6 +123,12 @@ def give_commands():
     ask(Trigger, "reset")
 
 
+def ask_meanwhile():
+    waiting = call(Trigger, "new_map")
+    ask(GetState, "get_state")
+    show("still waits", not waiting.done())
+
+
 def spin(duration_s):
     until = time.monotonic() + duration_s
     while time.monotonic() < until:
@@ -136,7 +147,7 @@ while True:
         line = sys.stdin.readline().strip()
         if not line:
             break
-        {"lifecycle": take_through_states, "commands": give_commands}[line]()
+        {"lifecycle": take_through_states, "commands": give_commands, "meanwhile": ask_meanwhile}[line]()
 newest = time.monotonic()
 # What is under way: a map takes a second.
 while time.monotonic() < newest + 2.0:

@@ -21,7 +21,8 @@ const TRANSITIONS: Keep = Keep::Last(10);
 pub struct Bridge {
     shared: Shared,
     topics: Topics,
-    services: Services,
+    /// Each on a thread of its own: the answer to a command waits for a scan.
+    services: Vec<Services>,
     /// Dropped last: it owns the topics.
     _node: Node,
 }
@@ -39,15 +40,18 @@ impl Bridge {
         })
     }
 
-    /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
-    pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), RunError> {
+    /// Publishes until a signal arrives.
+    pub fn publish(mut self, signals: &Signals) -> Result<(), RunError> {
         let (shared, services, topics) = (&self.shared, self.services, self.topics.of_run);
         let mounted = shared.settings.vehicle.mounted(clock::since_1970_ns());
         self.topics.mounting.send(mounted);
         thread::scope(|threads| {
-            // Its end by an error ends the bridge.
-            let served = threads.spawn(|| services.run(shared).inspect_err(|_| shared.stop()));
-            threads.spawn(|| follow_runs(shared, topics, say));
+            // Their end by an error ends the bridge.
+            let serve = |services: Services| {
+                threads.spawn(move || services.run(shared).inspect_err(|_| shared.stop()))
+            };
+            let served: Vec<_> = services.into_iter().map(serve).collect();
+            threads.spawn(|| follow_runs(shared, topics));
             threads.spawn(|| report(shared, self.topics.diagnostics));
             let mut stopped = Ok(false);
             while let Ok(false) = stopped
@@ -56,8 +60,9 @@ impl Bridge {
                 stopped = signals.sleep(POLL_INTERVAL);
             }
             shared.stop();
-            let served = served.join().unwrap_or_else(|panic| resume_unwind(panic));
-            stopped.and(served)
+            let ended = served.into_iter().map(|it| it.join());
+            let ended = ended.map(|it| it.unwrap_or_else(|panic| resume_unwind(panic)));
+            ended.fold(stopped.map(drop), Result::and)
         })
     }
 }

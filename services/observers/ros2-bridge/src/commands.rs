@@ -35,25 +35,16 @@ pub fn new_map(shared: &Shared) -> Done {
 /// decides.
 pub fn initial_pose(shared: &Shared, message: &PoseWithCovarianceStamped) -> Done {
     let vehicle = &shared.settings.vehicle;
-    let (pose, sigmas) = vehicle.given(message);
+    let (pose, [sigma_m, sigma_rad]) = vehicle.given(message);
+    let given = |sigma: f64, usual| if sigma > 0.0 { sigma } else { usual };
     let at = |pose: &Pose| {
-        let [x_m, y_m, yaw_rad] = xy_yaw(pose);
-        let usual = GivenPose::default();
-        let [sigma_m, sigma_rad] = sigmas;
+        let ([x_m, y_m, yaw_rad], usual) = (xy_yaw(pose), GivenPose::default());
         GivenPose {
             x_m,
             y_m,
             yaw_rad,
-            sigma_m: if sigma_m > 0.0 {
-                sigma_m
-            } else {
-                usual.sigma_m
-            },
-            sigma_rad: if sigma_rad > 0.0 {
-                sigma_rad
-            } else {
-                usual.sigma_rad
-            },
+            sigma_m: given(sigma_m, usual.sigma_m),
+            sigma_rad: given(sigma_rad, usual.sigma_rad),
         }
     };
     let (frame, map) = (&message.header.frame_id, &vehicle.frames.map);
@@ -79,7 +70,7 @@ fn give(shared: &Shared, command: Command) -> Done {
         Ok(Some(_)) => (true, "applied to the next scan".to_owned()),
         Ok(None) => (
             true,
-            "no scan has taken it yet: it applies to the next one".to_owned(),
+            "no scan has taken it yet: it applies to the next one, if one comes".to_owned(),
         ),
         Err(error) => (false, error.to_string()),
     };

@@ -4,15 +4,10 @@ use std::{thread, time::Duration};
 
 use gyre_client::{Manifest, Next, Run, RunError};
 use gyre_contract::{
-    Correction, Fix, FixHeader, Item, Masked, MaskedHeader, Message, Objects, ObjectsHeader, Pose,
-    PoseHeader, PredictedPose, PredictedPoseHeader, Witness, flag,
+    Correction, Fix, Item, Masked, Message, Objects, ObjectsHeader, Pose, PoseHeader,
+    PredictedPose, PredictedPoseHeader, Witness, flag,
 };
-use gyre_ros2_messages::{
-    builtin_interfaces::Time,
-    geometry_msgs::{PoseWithCovarianceStamped, TwistWithCovarianceStamped},
-    objects,
-    rosgraph_msgs::Clock,
-};
+use gyre_ros2_messages::{builtin_interfaces::Time, objects, rosgraph_msgs::Clock};
 
 use serde::Serialize;
 
@@ -23,7 +18,7 @@ use crate::{
     topics::{ObjectTopics, PoseTopics, RunTopics},
 };
 
-pub fn follow_runs(shared: &Shared, mut topics: RunTopics, say: fn(&str)) {
+pub fn follow_runs(shared: &Shared, mut topics: RunTopics) {
     while !shared.is_stopping() {
         let Ok(run) = Run::open(&shared.settings.out) else {
             // There is no run yet.
@@ -35,16 +30,16 @@ pub fn follow_runs(shared: &Shared, mut topics: RunTopics, say: fn(&str)) {
         let settings = (shared.settings.of_run)(&shared.settings.out);
         match own_topic(&settings, &topics.poses) {
             Some(sentence) => {
-                say(&sentence);
+                shared.say(&sentence);
                 shared.state().notice = Some(sentence);
                 await_end(shared, &run);
             }
-            None => follow_run(shared, manifest, &settings, &mut topics, say),
+            None => follow_run(shared, manifest, &settings, &mut topics),
         }
         if run.has_ended() {
             shared.state().phase = RunPhase::Ended;
             let sentence = sentence(&shared.state());
-            say(&sentence);
+            shared.say(&sentence);
         }
     }
 }
@@ -52,12 +47,23 @@ pub fn follow_runs(shared: &Shared, mut topics: RunTopics, say: fn(&str)) {
 /// Follows a topic of a run to its end.
 type Follow<'a> = Box<dyn FnMut(&Run) -> Result<(), RunError> + Send + 'a>;
 
-/// Calls `take` with the header of each message of a topic.
+/// Calls `take` with the header of each message of a topic, until the stream ends or the bridge
+/// stops.
 fn each<'a, M: Message>(
     shared: &'a Shared,
     mut take: impl FnMut(&M::Header) + Send + 'a,
 ) -> Follow<'a> {
-    Box::new(move |run| each_message::<M>(shared, run, &mut take))
+    Box::new(move |run| {
+        let mut observer = run.observe::<M>()?;
+        while !shared.is_stopping() {
+            match observer.next(POLL_INTERVAL)? {
+                Next::Message(message, _) => take(message.header()),
+                Next::Idle => {}
+                Next::Ended => break,
+            }
+        }
+        Ok(())
+    })
 }
 
 /// Returns a sentence if the run would receive its own odometry as the speed of its wheels.
@@ -75,7 +81,6 @@ fn follow_run(
     manifest: &Manifest,
     settings: &Result<RunSettings, String>,
     topics: &mut RunTopics,
-    say: fn(&str),
 ) {
     let (name, window) = (manifest.prefix.as_str(), &manifest.window);
     let is = |of: fn(&RunSettings) -> bool| settings.as_ref().is_ok_and(of);
@@ -90,25 +95,36 @@ fn follow_run(
     if poses.clock.is_some() && !poses.has_clock {
         let unread = settings.as_ref().err().map(String::as_str);
         let reason = unread.unwrap_or("the run does not play a recording");
-        say(&format!("/clock is not published: {reason}"));
+        shared.say(&format!("/clock is not published: {reason}"));
     }
+    let vehicle = &shared.settings.vehicle;
     let (has_doppler, predicts) = (is(|it| it.has_doppler), is(|it| it.predicts));
     let mut followed: Vec<Follow<'_>> = vec![Box::new(move |run| {
-        follow_poses(shared, run, poses, predicts, say)
+        follow_poses(shared, run, poses, predicts)
     })];
     if window.objects {
-        followed.push(each::<Objects>(shared, |it| {
-            objects.publish(shared, it, say)
-        }));
+        followed.push(each::<Objects>(shared, |it| objects.publish(shared, it)));
     }
     if has_doppler {
         followed.push(each::<Masked>(shared, |it| {
-            publish_doppler(doppler, shared, it, say)
+            publish_some(
+                doppler,
+                shared,
+                &it.item,
+                |state| &mut state.doppler,
+                |stamp_ns| Some(vehicle.doppler(stamp_ns, it.of(Witness::Doppler)?)),
+            );
         }));
     }
     if window.localises {
         followed.push(each::<Fix>(shared, |it| {
-            publish_fix(fixes, shared, it, say)
+            publish_some(
+                fixes,
+                shared,
+                &it.item,
+                |state| &mut state.fixes,
+                |stamp_ns| vehicle.fix(stamp_ns, it),
+            );
         }));
     }
     if window.slam {
@@ -159,7 +175,6 @@ fn follow_poses(
     run: &Run,
     topics: &mut PoseTopics,
     predicts: bool,
-    say: fn(&str),
 ) -> Result<(), RunError> {
     shared.state().notice = None;
     (topics.predicted_ns, topics.last) = (None, None);
@@ -173,11 +188,11 @@ fn follow_poses(
         if let Some(predictions) = &mut predictions
             && let Next::Message(message, _) = predictions.next(POLL_INTERVAL)?
         {
-            topics.publish_prediction(shared, message.header(), say);
+            topics.publish_prediction(shared, message.header());
             limit = Duration::ZERO;
         }
         match poses.next(limit)? {
-            Next::Message(message, _) => topics.publish(shared, message.header(), say),
+            Next::Message(message, _) => topics.publish(shared, message.header()),
             Next::Idle => {}
             Next::Ended => break,
         }
@@ -195,6 +210,11 @@ fn sentence(state: &RunState) -> String {
     );
     for (count, reason) in [
         (state.unread, "published while odom had no reader"),
+        (state.predictions.published, "between scans published"),
+        (
+            state.poses.left_out,
+            "not published, since a prediction was ahead of them",
+        ),
         (
             state.poses.held_back,
             "not published, since the node was not active",
@@ -207,79 +227,53 @@ fn sentence(state: &RunState) -> String {
     sentence
 }
 
-/// Calls `take` with the header of each message of a topic, until the stream ends or the bridge
-/// stops.
-fn each_message<M: Message>(
-    shared: &Shared,
-    run: &Run,
-    mut take: impl FnMut(&M::Header),
-) -> Result<(), RunError> {
-    let mut observer = run.observe::<M>()?;
-    while !shared.is_stopping() {
-        match observer.next(POLL_INTERVAL)? {
-            Next::Message(message, _) => take(message.header()),
-            Next::Idle => {}
-            Next::Ended => break,
-        }
-    }
-    Ok(())
+type CountsOf = fn(&mut RunState) -> &mut Counts;
+
+/// Counts a message of a topic; returns its time in ROS, ns, if it is to be published: not while
+/// the node is inactive, nor if it was published before the stream was interrupted.
+fn counted(shared: &Shared, item: &Item, counts: CountsOf) -> Option<i64> {
+    let (is_active, mut state) = (shared.is_active(), shared.state());
+    let is_new = counts(&mut state).count(item, is_active);
+    is_new.then(|| state.stamp_ns(item.stamp_ns, shared.settings.say))
 }
 
 impl PoseTopics {
     /// Publishes a pose as odometry and as transforms; the map's transform comes from the loops of
     /// SLAM.
-    fn publish(&mut self, shared: &Shared, pose: &PoseHeader, say: fn(&str)) {
-        let is_active = shared.is_active();
-        let (stamp_ns, map_from_odometry) = {
-            let mut state = shared.state();
-            // False also for a pose that was published before the stream was interrupted.
-            if !state.poses.count(&pose.item, is_active) {
-                return;
-            }
-            state.motions.add(&pose.motion.refinement);
-            let stamp_ns = state.stamp_ns(pose.item.stamp_ns, say);
-            (stamp_ns, state.map_from_odometry)
+    fn publish(&mut self, shared: &Shared, pose: &PoseHeader) {
+        let Some(stamp_ns) = counted(shared, &pose.item, |state| &mut state.poses) else {
+            return;
         };
+        shared.state().motions.add(&pose.motion.refinement);
         self.last = Some(*pose);
         // The sensor's clock may have stepped back.
         if pose.item.is(flag::BREAK) {
             self.predicted_ns = None;
         }
-        let mut unsent = 0;
         // The time comes first: a later stamp is in the future of a reader.
         if let Some(topic) = self.clock.as_mut().filter(|_| self.has_clock) {
             let clock = Time::from_ns(stamp_ns);
-            unsent += u64::from(!topic.send(Clock { clock }));
+            shared.sent(topic.send(Clock { clock }));
         }
-        shared.state().unsent += unsent;
         // A prediction is ahead of the next scan.
-        if self
+        match self
             .predicted_ns
-            .is_none_or(|predicted_ns| predicted_ns < stamp_ns)
+            .is_some_and(|ahead_ns| ahead_ns >= stamp_ns)
         {
-            self.send(shared, pose, stamp_ns, map_from_odometry.as_ref());
+            true => shared.state().poses.leave_out(),
+            false => self.send(shared, pose, stamp_ns),
         }
     }
 
     /// Publishes a pose between scans in the same way, with the last velocity.
-    fn publish_prediction(
-        &mut self,
-        shared: &Shared,
-        predicted: &PredictedPoseHeader,
-        say: fn(&str),
-    ) {
-        let is_active = shared.is_active();
-        let (stamp_ns, map_from_odometry) = {
-            let mut state = shared.state();
-            if !state.predictions.count(&predicted.item, is_active) {
-                return;
-            }
-            let stamp_ns = state.stamp_ns(predicted.item.stamp_ns, say);
-            (stamp_ns, state.map_from_odometry)
+    fn publish_prediction(&mut self, shared: &Shared, predicted: &PredictedPoseHeader) {
+        let counts: CountsOf = |state| &mut state.predictions;
+        let Some(stamp_ns) = counted(shared, &predicted.item, counts) else {
+            return;
         };
         // Nothing is predicted where a chain starts: the prediction is of the chain before.
         let Some(last) = self.last.filter(|last| !last.item.is(flag::BREAK)) else {
-            return;
+            return shared.state().predictions.leave_out();
         };
         let pose = PoseHeader {
             x_m: predicted.x_m,
@@ -289,88 +283,37 @@ impl PoseTopics {
             ..last
         };
         self.predicted_ns = Some(stamp_ns);
-        self.send(shared, &pose, stamp_ns, map_from_odometry.as_ref());
+        self.send(shared, &pose, stamp_ns);
     }
 
     /// Sends odometry and transforms.
-    fn send(
-        &mut self,
-        shared: &Shared,
-        pose: &PoseHeader,
-        stamp_ns: i64,
-        map_from_odometry: Option<&gyre_geometry::Pose>,
-    ) {
-        let (vehicle, mut unsent) = (&shared.settings.vehicle, 0);
+    fn send(&mut self, shared: &Shared, pose: &PoseHeader, stamp_ns: i64) {
+        let vehicle = &shared.settings.vehicle;
         if let Some(topic) = &mut self.transforms {
-            let ahead_ns = shared.settings.ahead_ns;
-            let transforms = vehicle.transforms(stamp_ns, pose, map_from_odometry, ahead_ns);
-            unsent += u64::from(!topic.send(transforms));
+            let (map, ahead_ns) = (shared.state().map_from_odometry, shared.settings.ahead_ns);
+            shared.sent(topic.send(vehicle.transforms(stamp_ns, pose, map.as_ref(), ahead_ns)));
         }
         let is_unread = !self.odometry.has_reader();
-        unsent += u64::from(!self.odometry.send(vehicle.odometry(stamp_ns, pose)));
-        let mut state = shared.state();
-        state.unsent += unsent;
-        state.unread += u64::from(is_unread);
+        shared.sent(self.odometry.send(vehicle.odometry(stamp_ns, pose)));
+        shared.state().unread += u64::from(is_unread);
     }
 }
 
 impl ObjectTopics {
     /// Publishes the objects of a scan, even an empty list.
-    fn publish(&mut self, shared: &Shared, header: &ObjectsHeader, say: fn(&str)) {
-        let is_active = shared.is_active();
-        let stamp_ns = {
-            let mut state = shared.state();
-            // False also for objects that were published before the stream was interrupted.
-            if !state.objects.count(&header.item, is_active) {
-                return;
-            }
-            state.stamp_ns(header.item.stamp_ns, say)
+    fn publish(&mut self, shared: &Shared, header: &ObjectsHeader) {
+        let counts: CountsOf = |state| &mut state.objects;
+        let Some(stamp_ns) = counted(shared, &header.item, counts) else {
+            return;
         };
         let (vehicle, listed) = (&shared.settings.vehicle, header.list());
         let detections = objects::detections(stamp_ns, vehicle, listed);
-        let markers = objects::markers(stamp_ns, vehicle, listed);
-        let sent = [self.detections.send(detections), self.markers.send(markers)];
-        shared.state().unsent += sent.map(|is_sent| u64::from(!is_sent)).iter().sum::<u64>();
+        shared.sent(self.detections.send(detections));
+        shared.sent(
+            self.markers
+                .send(objects::markers(stamp_ns, vehicle, listed)),
+        );
     }
-}
-
-/// Publishes the velocity of a scan that Doppler has measured.
-fn publish_doppler(
-    topic: &mut Outlet<TwistWithCovarianceStamped>,
-    shared: &Shared,
-    scan: &MaskedHeader,
-    say: fn(&str),
-) {
-    let vehicle = &shared.settings.vehicle;
-    publish_some(
-        topic,
-        shared,
-        &scan.item,
-        say,
-        |state| &mut state.doppler,
-        |stamp_ns| {
-            let velocity = scan.of(Witness::Doppler)?;
-            Some(vehicle.doppler(stamp_ns, velocity))
-        },
-    );
-}
-
-/// Publishes the pose of a keyframe in the map of an earlier drive, if it was found there.
-fn publish_fix(
-    topic: &mut Outlet<PoseWithCovarianceStamped>,
-    shared: &Shared,
-    fix: &FixHeader,
-    say: fn(&str),
-) {
-    let vehicle = &shared.settings.vehicle;
-    publish_some(
-        topic,
-        shared,
-        &fix.item,
-        say,
-        |state| &mut state.fixes,
-        |stamp_ns| vehicle.fix(stamp_ns, fix),
-    );
 }
 
 /// Publishes the message of an item, if it has one, and counts it.
@@ -378,21 +321,14 @@ fn publish_some<M: Serialize>(
     topic: &mut Outlet<M>,
     shared: &Shared,
     item: &Item,
-    say: fn(&str),
-    counts: fn(&mut RunState) -> &mut Counts,
+    counts: CountsOf,
     message: impl FnOnce(i64) -> Option<M>,
 ) {
-    let is_active = shared.is_active();
-    let mut state = shared.state();
-    if !counts(&mut state).count(item, is_active) {
+    let Some(stamp_ns) = counted(shared, item, counts) else {
         return;
-    }
-    match message(state.stamp_ns(item.stamp_ns, say)) {
-        Some(message) => {
-            drop(state);
-            let is_sent = topic.send(message);
-            shared.state().unsent += u64::from(!is_sent);
-        }
-        None => counts(&mut state).was_empty(),
+    };
+    match message(stamp_ns) {
+        Some(message) => shared.sent(topic.send(message)),
+        None => counts(&mut shared.state()).leave_out(),
     }
 }

@@ -83,6 +83,8 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
     let of_bridge = [
         ("poses published", state.poses.published),
         ("poses missed", state.poses.missed()),
+        ("poses behind a prediction", state.poses.left_out),
+        ("poses between scans published", state.predictions.published),
         ("objects published", state.objects.published),
         ("objects missed", state.objects.missed()),
         ("poses without a reader", state.unread),
@@ -91,7 +93,7 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
         ("Doppler velocities missed", state.doppler.missed()),
         ("fixes published", state.fixes.published),
         ("fixes missed", state.fixes.missed()),
-        ("keyframes not found in the map", state.fixes.empty),
+        ("keyframes not found in the map", state.fixes.left_out),
         ("messages not sent", state.unsent),
         ("maps published", state.maps),
     ];
@@ -136,12 +138,21 @@ fn process(process: &ProcessStatus) -> DiagnosticStatus {
     let death = process.last_death.as_ref();
     part.values
         .extend(death.map(|cause| KeyValue::new("last_death", cause)));
+    let clock = process.received.and_then(|it| it.clock);
+    part.values.extend(clock.iter().flat_map(|clock| {
+        let seconds = |ns: i64| format!("{:.6}", ns as f64 * 1e-9);
+        [
+            KeyValue::new("radar_clock_offset_s", seconds(clock.offset_ns)),
+            KeyValue::new("radar_clock_jitter_s", seconds(clock.jitter_ns)),
+            KeyValue::new("radar_clock_steps", clock.steps),
+        ]
+    }));
     part
 }
 
 #[cfg(test)]
 mod tests {
-    use gyre_contract::control::Phase;
+    use gyre_contract::control::{Received, SensorClock};
 
     use super::*;
 
@@ -160,23 +171,12 @@ mod tests {
             received: None,
         };
         Status {
-            pid: 1,
-            out: "out".into(),
-            started_in: "/".into(),
-            live: true,
-            phase: Phase::Running,
-            uptime_s: 2.0,
-            published: Some(9),
-            poses: 8,
             dropped,
-            last_pose_s: Some(0.1),
-            notice: None,
-            disk_is_full: false,
-            swap: None,
             processes: vec![
                 process("masking", Activity::Working),
                 process("refinement", Activity::Silent),
             ],
+            ..Status::default()
         }
     }
 
@@ -202,5 +202,24 @@ mod tests {
         assert_eq!(levels(&state, Some(status(3))), [WARN, OK, ERROR]);
         state.phase = RunPhase::Ended;
         assert_eq!(levels(&state, None), [STALE]);
+    }
+
+    #[test]
+    fn the_radar_has_its_clock_among_its_figures() {
+        let mut source = status(0).processes.remove(0);
+        let clock = SensorClock {
+            offset_ns: -250_000_000,
+            steps: 3,
+            ..SensorClock::default()
+        };
+        source.received = Some(Received {
+            clock: Some(clock),
+            ..Received::default()
+        });
+        let values = process(&source).values;
+        for (key, value) in [("offset_s", "-0.250000"), ("steps", "3")] {
+            let expected = KeyValue::new(&format!("radar_clock_{key}"), value);
+            assert!(values.contains(&expected), "{values:?}");
+        }
     }
 }

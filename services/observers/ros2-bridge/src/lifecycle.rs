@@ -17,12 +17,8 @@ const INACTIVE: u8 = 2;
 const ACTIVE: u8 = 3;
 const FINALIZED: u8 = 4;
 
-const STATES: [(u8, &str); 4] = [
-    (UNCONFIGURED, "unconfigured"),
-    (INACTIVE, "inactive"),
-    (ACTIVE, "active"),
-    (FINALIZED, "finalized"),
-];
+/// The names of the states, in the order of their numbers.
+const STATES: [&str; 4] = ["unconfigured", "inactive", "active", "finalized"];
 
 /// Each transition: number, name, and the states before and after it.
 const TRANSITIONS: [(u8, &str, u8, u8); 7] = [
@@ -65,42 +61,40 @@ impl Lifecycle {
     /// Makes a transition, and publishes it; false if the state does not have it.
     pub fn change(&self, wanted: &Transition) -> bool {
         let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some((id, label, from, to)) = transition(self.current(), wanted) else {
+        let Some(made) = transition(self.current(), wanted) else {
             return false;
         };
-        self.current.store(to, Ordering::Relaxed);
+        self.current.store(made.goal_state.id, Ordering::Relaxed);
         events.send(TransitionEvent {
             timestamp: clock::since_1970_ns().unsigned_abs(),
-            transition: Transition {
-                id,
-                label: label.to_owned(),
-            },
-            start_state: state_of(from),
-            goal_state: state_of(to),
+            transition: made.transition,
+            start_state: made.start_state,
+            goal_state: made.goal_state,
         });
         true
     }
 }
 
 /// Returns the transition of this name, else of this number, from a state.
-fn transition(from: u8, wanted: &Transition) -> Option<(u8, &'static str, u8, u8)> {
-    let mut from_here = TRANSITIONS.into_iter().filter(|it| it.2 == from);
-    from_here.find(|(id, label, ..)| match wanted.label.is_empty() {
-        true => *id == wanted.id,
-        false => *label == wanted.label,
+fn transition(from: u8, wanted: &Transition) -> Option<TransitionDescription> {
+    let mut from_here = transitions()
+        .into_iter()
+        .filter(|it| it.start_state.id == from);
+    from_here.find(|it| match wanted.label.is_empty() {
+        true => it.transition.id == wanted.id,
+        false => it.transition.label == wanted.label,
     })
 }
 
 fn state_of(id: u8) -> State {
-    let known = STATES.iter().find(|(known, _)| *known == id);
     State {
         id,
-        label: known.map_or("unknown", |(_, label)| label).to_owned(),
+        label: STATES[usize::from(id - UNCONFIGURED)].to_owned(),
     }
 }
 
 pub fn states() -> Vec<State> {
-    STATES.into_iter().map(|(id, _)| state_of(id)).collect()
+    (UNCONFIGURED..=FINALIZED).map(state_of).collect()
 }
 
 pub fn transitions() -> Vec<TransitionDescription> {
@@ -123,7 +117,7 @@ mod tests {
     fn a_state_has_its_transitions_by_number_or_by_name() {
         let to = |from, id, label: &str| {
             let label = label.to_owned();
-            transition(from, &Transition { id, label }).map(|it| it.3)
+            transition(from, &Transition { id, label }).map(|it| it.goal_state.id)
         };
         assert_eq!(to(UNCONFIGURED, 1, ""), Some(INACTIVE));
         assert_eq!(to(UNCONFIGURED, 3, ""), None);

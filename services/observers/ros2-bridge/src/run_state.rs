@@ -58,8 +58,8 @@ pub struct Counts {
     pub published: u64,
     /// Those that were not published, since the node was not active.
     pub held_back: u64,
-    /// Those that contained nothing to publish.
-    pub empty: u64,
+    /// Those that contained nothing to publish, or poses that a prediction was ahead of.
+    pub left_out: u64,
     sequence: Sequence,
 }
 
@@ -76,10 +76,10 @@ impl Counts {
         is_new && is_active
     }
 
-    /// Corrects the count of a message that contains nothing to publish.
-    pub fn was_empty(&mut self) {
+    /// Corrects the count of a message that is not published.
+    pub fn leave_out(&mut self) {
         self.published -= 1;
-        self.empty += 1;
+        self.left_out += 1;
     }
 
     pub fn missed(&self) -> u64 {
@@ -157,6 +157,16 @@ impl Shared {
         self.stopping.store(true, Ordering::Relaxed);
     }
 
+    /// Passes a sentence to the terminal.
+    pub fn say(&self, sentence: &str) {
+        (self.settings.say)(sentence);
+    }
+
+    /// Counts a message that was not sent.
+    pub fn sent(&self, is_sent: bool) {
+        self.state().unsent += u64::from(!is_sent);
+    }
+
     pub fn is_stopping(&self) -> bool {
         self.stopping.load(Ordering::Relaxed)
     }
@@ -178,6 +188,19 @@ fn offset_ns(first_ns: i64, now_ns: i64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_out_does_not_count_as_published() {
+        let mut counts = Counts::default();
+        for seq in 0..3 {
+            assert!(counts.count(&Item::numbered(seq), true));
+        }
+        counts.leave_out();
+        assert_eq!(
+            (counts.published, counts.left_out, counts.missed()),
+            (2, 1, 0)
+        );
+    }
 
     const NOW_NS: i64 = 1_800_000_000_000_000_000;
 

@@ -2,6 +2,7 @@
 //! [`topics`](crate::topics).
 
 use gyre_client::{RunError, wait_for_readable};
+use gyre_ros2_messages::lifecycle_msgs::State;
 use ros2_client::Message;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -24,6 +25,11 @@ impl<T: Serialize + DeserializeOwned> Message for Wire<T> {}
 #[derive(Clone, Serialize, Deserialize)]
 struct Empty(u8);
 
+fn state(shared: &Shared) -> State {
+    let lifecycle = shared.lifecycle.as_ref();
+    lifecycle.map(Lifecycle::state).unwrap_or_default()
+}
+
 /// Answers all requests to a service, or takes all messages of a topic, that have arrived.
 type Serve = Box<dyn Fn(&Shared) + Send>;
 
@@ -33,68 +39,64 @@ pub struct Services {
 }
 
 impl Services {
-    /// Opens the services. Only a managed node has services for its states.
-    pub fn open(node: &mut Node, is_managed: bool) -> Result<Self, RunError> {
-        let mut services = Self {
-            wakeups: Wakeups::new()?,
-            served: Vec::new(),
-        };
-        services.add_commands(node)?;
+    /// Opens the services: those for commands, whose answers wait for a scan, and of a managed node
+    /// those for its states.
+    pub fn open(node: &mut Node, is_managed: bool) -> Result<Vec<Self>, RunError> {
+        let mut all = vec![Self::for_commands(node)?];
         if is_managed {
-            services.add_lifecycle(node)?;
+            all.push(Self::for_lifecycle(node)?);
         }
-        Ok(services)
+        Ok(all)
     }
 
-    fn add_commands(&mut self, node: &mut Node) -> Result<(), RunError> {
-        let trigger = ["std_srvs", "Trigger"];
-        self.add(node, "reset", trigger, |shared, Empty(_)| {
+    fn new() -> Result<Self, RunError> {
+        Ok(Self {
+            wakeups: Wakeups::new()?,
+            served: Vec::new(),
+        })
+    }
+
+    fn for_commands(node: &mut Node) -> Result<Self, RunError> {
+        let (mut services, trigger) = (Self::new()?, ["std_srvs", "Trigger"]);
+        services.add(node, "reset", trigger, |shared, Empty(_)| {
             commands::reset(shared)
         })?;
-        self.add(node, "new_map", trigger, |shared, Empty(_)| {
+        services.add(node, "new_map", trigger, |shared, Empty(_)| {
             commands::new_map(shared)
         })?;
-        let poses = self.wakeups.subscribe(node, "initialpose", 1, false)?;
-        self.served.push(Box::new(move |shared| {
+        let poses = services.wakeups.subscribe(node, "initialpose", 1, false)?;
+        services.served.push(Box::new(move |shared| {
             while let Ok(Some((message, _))) = poses.take() {
                 commands::initial_pose(shared, &message).report("initialpose");
             }
         }));
-        Ok(())
+        Ok(services)
     }
 
-    fn add_lifecycle(&mut self, node: &mut Node) -> Result<(), RunError> {
+    fn for_lifecycle(node: &mut Node) -> Result<Self, RunError> {
+        let mut services = Self::new()?;
         let of = |name| ["lifecycle_msgs", name];
-        self.add(node, "change_state", of("ChangeState"), |shared, wanted| {
+        services.add(node, "change_state", of("ChangeState"), |shared, wanted| {
             let lifecycle = shared.lifecycle.as_ref();
             lifecycle.is_some_and(|it| it.change(&wanted))
         })?;
-        self.add(node, "get_state", of("GetState"), |shared, Empty(_)| {
-            shared
-                .lifecycle
-                .as_ref()
-                .map(Lifecycle::state)
-                .unwrap_or_default()
+        services.add(node, "get_state", of("GetState"), |shared, Empty(_)| {
+            state(shared)
         })?;
         let states = of("GetAvailableStates");
-        self.add(node, "get_available_states", states, |_, Empty(_)| {
+        services.add(node, "get_available_states", states, |_, Empty(_)| {
             lifecycle::states()
         })?;
-        let transitions = of("GetAvailableTransitions");
-        self.add(
-            node,
-            "get_available_transitions",
-            transitions,
-            |shared, Empty(_)| {
-                let state = shared.lifecycle.as_ref().map(Lifecycle::state);
-                let mut available = lifecycle::transitions();
-                available.retain(|it| Some(&it.start_state) == state.as_ref());
-                available
-            },
-        )?;
-        self.add(node, "get_transition_graph", transitions, |_, Empty(_)| {
+        let (name, transitions) = ("get_available_transitions", of("GetAvailableTransitions"));
+        services.add(node, name, transitions, |shared, Empty(_)| {
+            let mut available = lifecycle::transitions();
+            available.retain(|it| it.start_state == state(shared));
+            available
+        })?;
+        services.add(node, "get_transition_graph", transitions, |_, Empty(_)| {
             lifecycle::transitions()
-        })
+        })?;
+        Ok(services)
     }
 
     /// Adds a service below the name of the node, such as `/gyre/get_state`, by its package and

@@ -23,6 +23,8 @@ pub struct Settings {
     pub clock: bool,
     /// True for a managed node, which publishes only while it is active.
     pub is_managed: bool,
+    /// Takes sentences for the terminal.
+    pub say: fn(&str),
     /// Reads the settings of the run in a folder.
     pub of_run: fn(&Path) -> Result<RunSettings, String>,
 }

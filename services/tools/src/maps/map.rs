@@ -2,6 +2,7 @@
 
 mod arguments;
 pub mod placing;
+mod poses;
 
 use std::{
     collections::BTreeMap,
@@ -12,9 +13,7 @@ use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
 };
-use gyre_datasets::ground_truth::read_trajectory;
 use gyre_geometry::Pose;
-use gyre_radar::Trajectory;
 use gyre_results::{Content, Out, georeference, map_options, require_results};
 use gyre_slam::{
     Keyframe, RecordReader,
@@ -29,6 +28,7 @@ use gyre_storage::StorageError;
 
 use crate::maps::folder;
 pub use arguments::{MapArguments, MapFormat};
+use poses::Poses;
 
 /// The corrected trajectory, and the trajectory of odometry.
 const CORRECTED: &str = "trajectory_slam.tum";
@@ -50,9 +50,7 @@ pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
 
 fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let mut keyframes = open(&arguments.run)?;
-    let given = arguments.trajectory.clone();
-    let trajectory = given.unwrap_or_else(|| trajectory_of(&arguments.run));
-    let poses = read_trajectory(&trajectory)?;
+    let poses = Poses::read(&arguments.run, arguments.trajectory.as_ref())?;
     let loops = placing::used_loops(&arguments.run)?;
     let configuration = configuration(&arguments.run)?;
     let _locked = Out::lock_for(&arguments.out, Content::MAP)?;
@@ -64,7 +62,7 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let lines = draw(&mut keyframes, &poses, &loops, &mut drawing)?;
     let (count, total) = (drawing.keyframes(), keyframes.len());
     if count < total {
-        let (left_out, file) = (total - count, trajectory.display());
+        let (left_out, file) = (total - count, poses.path.display());
         print::note(format_args!(
             "{left_out} of {total} keyframes have no pose in {file} and are left out"
         ));
@@ -83,11 +81,11 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
 /// name.
 pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Failure> {
     let mut keyframes = open(run)?;
-    let poses = read_trajectory(&trajectory_of(run))?;
+    let poses = Poses::read(run, None)?;
     let mut evidence = Evidence::new(&map_options(&configuration(run)?), folder)?;
     for index in 0..keyframes.len() {
         let keyframe = keyframes.read(index)?;
-        if let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) {
+        if let Some(pose) = poses.of(&keyframe) {
             evidence.draw(&keyframe, &(placed * pose))?;
         }
     }
@@ -95,11 +93,11 @@ pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Fa
 }
 
 /// Returns the keyframes that have a pose, with their poses in the frame of the first one.
-pub fn placed(keyframes: &mut RecordReader<Keyframe>, poses: &Trajectory) -> Result<Map, Failure> {
+pub fn placed(keyframes: &mut RecordReader<Keyframe>, poses: &Poses) -> Result<Map, Failure> {
     let (mut kept, mut first): (_, Option<Pose>) = (Vec::new(), None);
     for index in 0..keyframes.len() {
         let mut keyframe = keyframes.read(index)?;
-        if let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) {
+        if let Some(pose) = poses.of(&keyframe) {
             keyframe.pose.motion = first.get_or_insert(pose).inv_mul(&pose);
             kept.push(keyframe);
         }
@@ -155,36 +153,28 @@ struct Lines {
 /// Draws all keyframes that have a pose. `loops` are between keyframes.
 fn draw(
     keyframes: &mut RecordReader<Keyframe>,
-    poses: &Trajectory,
+    poses: &Poses,
     loops: &[[usize; 2]],
     drawing: &mut Drawing,
 ) -> Result<Lines, Failure> {
-    let (mut placed, mut span_ns) = (BTreeMap::new(), None);
+    let (mut placed, mut span) = (BTreeMap::new(), None);
     for index in 0..keyframes.len() {
         let keyframe = keyframes.read(index)?;
-        let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) else {
+        let Some(pose) = poses.of(&keyframe) else {
             continue;
         };
         drawing.draw(&keyframe, &pose)?;
         placed.insert(index, pose);
-        let (first_ns, _) = span_ns.unwrap_or((keyframe.stamp_ns, 0));
-        span_ns = Some((first_ns, keyframe.stamp_ns));
+        let last = poses.key(&keyframe);
+        let (first, _) = span.unwrap_or((last, last));
+        span = Some((first, last));
     }
     let end = |keyframe: usize| placed.get(&keyframe).copied();
     let both = |&[from, to]: &[usize; 2]| Some([end(from)?, end(to)?]);
     Ok(Lines {
-        trajectory: span_ns.map_or(Vec::new(), |span_ns| part(poses, span_ns)),
+        trajectory: span.map_or(Vec::new(), |span| poses.part(span)),
         loops: loops.iter().filter_map(both).collect(),
     })
-}
-
-/// The poses from the first to the last keyframe: a ground truth may be of a longer drive.
-fn part(poses: &Trajectory, (first_ns, last_ns): (i64, i64)) -> Vec<Pose> {
-    let stamps = poses.stamp_ns.iter().flatten();
-    let within = |stamp_ns: i64| (first_ns..=last_ns).contains(&stamp_ns);
-    let poses = stamps.zip(&poses.poses);
-    let poses = poses.filter(|(stamp_ns, _)| within(**stamp_ns));
-    poses.map(|(_, pose)| *pose).collect()
 }
 
 fn export(
@@ -227,7 +217,8 @@ mod tests {
         };
         let points = vec![SparsePoint::from([20.0, 5.0, 0.0, 1.0, 0.0])];
         Keyframe {
-            stamp_ns: 1_000_000_000 * (seq as i64 + 1),
+            // The clock steps back before the third one.
+            stamp_ns: 1_000_000_000 * [1, 2, 1, 2][seq as usize],
             ..Keyframe::standing(seq, pose, points)
         }
     }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Args;
-use gyre_client::{Next, Run};
+use gyre_client::{Next, Run, control::Control};
 use gyre_configuration::terminal::{Failure, print};
 use gyre_contract::{Command, Correction, GivenPose};
 use gyre_geometry::{Pose, pose, xy_yaw};
@@ -55,31 +55,34 @@ pub fn reset(arguments: &ResetArguments) -> Result<(), Failure> {
         let place = gyre_geometry::pose(at.x_m, at.y_m, at.yaw_rad);
         [at.x_m, at.y_m, at.yaw_rad] = xy_yaw(&(odometry_from_map * place));
     }
-    let from_ns = run.command(Command::Reset { at, keep_map })?;
-    applied("is reset", from_ns)
+    give(&run, Command::Reset { at, keep_map }, "is reset")
 }
 
 /// Begins a new map of SLAM.
 pub fn new_map(choice: &RunChoice) -> Result<(), Failure> {
-    let from_ns = chosen_to_change(choice)?.command(Command::NewMap {})?;
-    applied("has a new map", from_ns)
+    give(
+        &chosen_to_change(choice)?,
+        Command::NewMap {},
+        "has a new map",
+    )
 }
 
 /// Gives a run the pose of the vehicle in its map (`slam.map`).
 pub fn locate(arguments: &LocateArguments) -> Result<(), Failure> {
     let at = given(arguments.pose, arguments.sigma);
     let run = chosen_to_change(&arguments.run)?;
-    let from_ns = run.command(Command::Locate { at })?;
-    applied("has the pose", from_ns)
+    give(&run, Command::Locate { at }, "has the pose")
 }
 
-fn applied(what: &str, from_ns: Option<i64>) -> Result<(), Failure> {
-    match from_ns {
+fn give(run: &Control, command: Command, what: &str) -> Result<(), Failure> {
+    match run.command(command)? {
         Some(from_ns) => print::line(format_args!(
             "the run {what} from the scan of {:.3} s on",
             from_ns as f64 * 1e-9
         )),
-        None => print::line("no scan has taken the command yet: it applies to the next one"),
+        None => print::line(
+            "no scan has taken the command yet: it applies to the next one, if one comes",
+        ),
     }
 }
 

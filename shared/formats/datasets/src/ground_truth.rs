@@ -3,7 +3,10 @@
 mod poses;
 mod tables;
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt::Display,
+    path::{Path, PathBuf},
+};
 
 pub use poses::{write_kitti, write_tum, write_tum_pose};
 
@@ -47,6 +50,11 @@ impl LineError {
         let reason = reason.into();
         Self { line, reason }
     }
+
+    fn of(self, path: &Path) -> TrajectoryError {
+        let (path, Self { line, reason }) = (path.display(), self);
+        TrajectoryError(format!("{path}, line {line}: {reason}"))
+    }
 }
 
 type Parse = fn(&str) -> Result<Trajectory, LineError>;
@@ -55,17 +63,26 @@ type Parse = fn(&str) -> Result<Trajectory, LineError>;
 /// REP-103. Sensors of TUM and KITTI files stay upright (z up or down): the poses are projected to
 /// the plane. Of a folder, its ground truth is read.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let failed = |reason: String| {
-        let path = path.display();
-        TrajectoryError(format!("cannot read the trajectory {path}: {reason}"))
-    };
     let missing = "it is a folder without a ground truth at a usual place: name the file";
     let file = match path.is_dir() {
-        true => find_ground_truth(path).ok_or_else(|| failed(missing.to_owned()))?,
+        true => find_ground_truth(path).ok_or_else(|| unreadable(path, missing))?,
         false => path.to_owned(),
     };
-    let text = gyre_storage::read_text(&file, MAX_BYTES).map_err(|e| failed(e.to_string()))?;
-    parse_trajectory(&text, &file)
+    parse_trajectory(&read(&file)?, &file)
+}
+
+/// Reads the trajectory of a run (TUM). Its times may step back, as the clock of a radar does.
+pub fn read_trajectory_of_run(path: &Path) -> Result<Trajectory, TrajectoryError> {
+    poses::tum(&read(path)?).map_err(|error| error.of(path))
+}
+
+fn read(path: &Path) -> Result<String, TrajectoryError> {
+    gyre_storage::read_text(path, MAX_BYTES).map_err(|error| unreadable(path, error))
+}
+
+fn unreadable(path: &Path, reason: impl Display) -> TrajectoryError {
+    let path = path.display();
+    TrajectoryError(format!("cannot read the trajectory {path}: {reason}"))
 }
 
 /// As [`read_trajectory`], from a text; `path` is the name in errors.
@@ -80,12 +97,11 @@ pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, Trajector
     };
     let parse = detect(text).map_err(unknown)?;
     let parsed = parse(text).and_then(|trajectory| {
+        check_times(text, &trajectory)?;
         check_places(text, &trajectory)?;
         Ok(trajectory)
     });
-    parsed.map_err(|LineError { line, reason }| {
-        TrajectoryError(format!("{name}, line {line}: {reason}"))
-    })
+    parsed.map_err(|error| error.of(path))
 }
 
 /// Returns the ground truth file of a dataset, if there is one at a usual path. `root` may also be
@@ -93,6 +109,23 @@ pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, Trajector
 pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
     let mut places = roots(root).flat_map(|root| PLACES.map(|place| root.join(place)));
     places.find(|path| path.is_file())
+}
+
+/// Times must not run backwards.
+fn check_times(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
+    let stamps = trajectory.stamps();
+    let back = stamps.windows(2).position(|pair| pair[1] < pair[0]);
+    back.map_or(Ok(()), |index| {
+        let back_s = (stamps[index] - stamps[index + 1]) as f64 * 1e-9;
+        let reason = format!("time runs backwards by {back_s:.6} s");
+        Err(LineError::new(line_of(text, trajectory, index + 1), reason))
+    })
+}
+
+/// Returns the line of a pose.
+fn line_of(text: &str, trajectory: &Trajectory, index: usize) -> usize {
+    let header = lines(text).count().saturating_sub(trajectory.len());
+    lines(text).nth(header + index).map_or(0, |(line, _)| line)
 }
 
 fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
@@ -105,12 +138,10 @@ fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
         let from = trajectory.poses[first].translation.vector;
         let apart_m = (pose.translation.vector - from).norm();
         if apart_m > MAX_APART_M {
-            let header = lines(text).count().saturating_sub(stamps.len());
-            let line = lines(text).nth(header + index);
             let reason = format!(
                 "its place is {apart_m:.1} m from a place of the same time: the times are rounded, and need three decimals of a second or more"
             );
-            return Err(LineError::new(line.map_or(0, |(line, _)| line), reason));
+            return Err(LineError::new(line_of(text, trajectory, index), reason));
         }
     }
     Ok(())
@@ -205,7 +236,7 @@ fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> 
     })
 }
 
-/// Collects what rows have at their times, which must not run backwards.
+/// Collects what rows have at their times.
 fn stamped<'a, T>(
     rows: impl Iterator<Item = (usize, &'a str)>,
     parse: impl Fn(usize, &str) -> Result<(i64, T), LineError>,
@@ -213,11 +244,6 @@ fn stamped<'a, T>(
     let (mut stamps, mut values) = (Vec::<i64>::new(), Vec::new());
     for (line, row) in rows {
         let (stamp, value) = parse(line, row)?;
-        if let Some(last) = stamps.last().filter(|last| stamp < **last) {
-            let back_s = (last - stamp) as f64 * 1e-9;
-            let reason = format!("time runs backwards by {back_s:.6} s");
-            return Err(LineError::new(line, reason));
-        }
         stamps.push(stamp);
         values.push(value);
     }

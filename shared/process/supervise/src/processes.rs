@@ -2,17 +2,22 @@
 
 use std::{
     collections::BTreeMap,
+    fs,
     ops::{Deref, DerefMut},
     time::{Duration, Instant},
 };
 
 use gyre_contract::PoseHeader;
-use gyre_transport::wake;
+use gyre_stage::sink;
+use gyre_transport::{Manifest, wake};
 
 use crate::{
     END_TIMEOUT, Ending, Event, Plan, SuperviseError, child::Child, followers::Followers,
     guardian::Guardian, recovery::Recovery, run::Run,
 };
+
+/// Time without progress for a process that writes what it has held while the disk was full.
+const CATCH_UP: Duration = Duration::from_secs(10);
 
 #[derive(Default)]
 pub(crate) struct Processes {
@@ -117,13 +122,18 @@ impl Processes {
         ending: Option<Ending>,
     ) -> Result<(), SuperviseError> {
         self.children.iter().for_each(Child::terminate);
-        let since = Instant::now();
+        let (mut since, mut kept) = (Instant::now(), kept_of_held(run.manifest()));
         let mut is_complete = matches!(ending, Some(Ending::Complete));
         while let Some(timeout) = self.longest_end(is_complete)
-            && since.elapsed() < timeout
+            && since.elapsed() < kept.map_or(timeout, |_| timeout.max(CATCH_UP))
         {
             is_complete &= !run.sleep(wake::MAX_WAIT)?;
             run.say(Event::Watched);
+            let now = kept_of_held(run.manifest());
+            if now > kept {
+                since = Instant::now();
+            }
+            kept = now;
         }
         let all: Vec<usize> = (0..self.len()).collect();
         self.kill(&all, &run.guardian)
@@ -147,5 +157,32 @@ impl Processes {
         let mut judged = children.filter(|(i, _)| !followers.has_given_up(*i));
         let failed = judged.find_map(|(_, child)| child.permanent_failure());
         failed.map_or(Ok(()), |message| Err(SuperviseError::Process(message)))
+    }
+}
+
+/// Returns the bytes of the journal while poses are held in memory, or have been until the end.
+fn kept_of_held(manifest: &Manifest) -> Option<u64> {
+    sink::notice(manifest)?;
+    let files = fs::read_dir(manifest.out.join("journal")).into_iter();
+    let files = files.flatten().flatten().flat_map(|file| file.metadata());
+    Some(files.map(|file| file.len()).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_counts_while_poses_are_held() {
+        let out = tempfile::tempdir().unwrap();
+        let manifest = crate::tests::manifest(out.path());
+        fs::create_dir(out.path().join("journal")).unwrap();
+        let kept = |name: &str| {
+            fs::write(out.path().join("journal").join(name), "written").unwrap();
+            kept_of_held(&manifest)
+        };
+        assert_eq!(kept("poses"), None);
+        sink::set_notice(&manifest, "the disk is full").unwrap();
+        assert_eq!([kept("poses"), kept("scans")], [Some(7), Some(14)]);
     }
 }

@@ -9,7 +9,7 @@ use gyre_contract::{
 use gyre_stage::schedule;
 use gyre_transport::{
     RunError, clock, received,
-    wake::{MAX_WAIT, Signals},
+    wake::{MAX_WAIT, Signals, request_stop},
 };
 
 use crate::{
@@ -54,9 +54,9 @@ pub fn wait<T>(
 }
 
 impl Supervisor<'_> {
-    /// Answers the requests that have come; true if one of them is to stop.
-    pub(crate) fn serve(&mut self) -> Result<bool, SuperviseError> {
-        let mut stop = false;
+    /// Answers the requests that have come. One to stop is the signal to stop, for all who look for
+    /// that in this process.
+    pub(crate) fn serve(&mut self) -> Result<(), SuperviseError> {
         for _ in 0..MAX_REQUESTS {
             let Some((request, client)) = self.socket.next() else {
                 break;
@@ -64,7 +64,7 @@ impl Supervisor<'_> {
             match request {
                 Request::Status => client.answer(&Answer::Status(Box::new(self.status()))),
                 Request::Stop => {
-                    stop = true;
+                    request_stop()?;
                     client.answer(&Answer::Done);
                 }
                 Request::Restart { process } => self.restart_on_request(&process, client)?,
@@ -75,7 +75,7 @@ impl Supervisor<'_> {
                 }),
             }
         }
-        Ok(stop)
+        Ok(())
     }
 
     /// Keeps a command for masking, which applies it to the next scan, and returns its number.
@@ -83,6 +83,9 @@ impl Supervisor<'_> {
         let manifest = &self.run.plan.manifest;
         let (slam, localises) = (manifest.window.slam, manifest.window.localises);
         let missing = match command {
+            _ if self.followers.are_awaited => {
+                Some("the last scan has passed: no scan takes a command")
+            }
             _ if !self.run.plan.takes_commands => {
                 Some("commands need masking and pose-integration in one run: here one is absent")
             }

@@ -104,9 +104,10 @@ impl<'a> Supervisor<'a> {
 
     fn watch(&mut self) -> Result<Ending, SuperviseError> {
         loop {
-            if self.sleep()? || self.serve()? {
+            if self.sleep()? {
                 return Ok(Ending::Interrupted);
             }
+            self.serve()?;
             if self.read_poses()? {
                 return self.await_followers();
             }
@@ -148,9 +149,10 @@ impl<'a> Supervisor<'a> {
                 return self.followers.end();
             };
             self.end_stuck_follower(*first)?;
-            if self.sleep()? || self.serve()? {
+            if self.sleep()? {
                 return Ok(Ending::Interrupted);
             }
+            self.serve()?;
             self.run.say(Event::Watched);
             self.keep_house()?;
             behind.retain(|i| self.processes[*i].has_exited());
