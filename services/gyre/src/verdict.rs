@@ -62,6 +62,13 @@ impl Check {
 pub fn judge(run: &Path) -> Result<ExitCode, Failure> {
     require_results(run)?;
     let configuration = Configuration::read(&run.join("config.toml"), &[])?;
+    if configuration.is_radar() {
+        let run = run.display();
+        return Err(format!(
+            "the run in {run} has no ground truth, and the scans of its radar are not stored: name a ground truth, gyre evaluate {run} FILE, or record a run (record.file) and evaluate a run of that recording"
+        )
+        .into());
+    }
     let summary: Value = serde_json::from_str(&fs::read_to_string(run.join("summary.json"))?)?;
     let arguments = CalibrateArguments::of_run(run);
     let recorded = Recorded::read(configuration.clone(), &arguments)?;

@@ -65,7 +65,8 @@ impl Summary {
 
     fn accuracy(&self) -> String {
         let Some(judgement) = &self.evaluation else {
-            return "not known: the run has no ground truth".to_owned();
+            let out = self.folder();
+            return format!("no ground truth: gyre evaluate {out} compares the run with itself");
         };
         let evaluation = &judgement.evaluation;
         let ate = format!("ATE {:.2} m", evaluation.ate.rmse_m);
@@ -101,17 +102,20 @@ impl Summary {
         )
     }
 
+    /// Returns the folder of the results, as short as a person here would write it.
+    fn folder(&self) -> String {
+        let out = Path::new(&self.out);
+        let here = env::current_dir().ok();
+        let short = here.and_then(|here| out.strip_prefix(here).ok());
+        short.unwrap_or(out).display().to_string()
+    }
+
     fn places(&self) -> String {
         let again = match self.ending {
             Some(Ending::Complete) => "",
             _ => "; the same command continues from here",
         };
-        let out = Path::new(&self.out);
-        // As short as a person here would write it.
-        let here = env::current_dir().ok();
-        let short = here.and_then(|here| out.strip_prefix(here).ok());
-        let out = short.unwrap_or(out);
-        let out = out.display();
+        let out = self.folder();
         format!("gyre report {out} --open; all figures: {out}/summary.json, or -v{again}")
     }
 }
@@ -172,7 +176,8 @@ mod tests {
         let text = summary("realtime", counts, 58_000.0).in_brief();
         let expected = "\
 complete    885 m in 116 s of driving, 466 scans; computed in 14.2 s
-accuracy    not known: the run has no ground truth
+accuracy    no ground truth: gyre evaluate out/radiate compares the run with
+            itself
 latency     31 ms (median), 58 ms (99 %): within the 250 ms of a scan
 unusual     nothing
 look at     gyre report out/radiate --open; all figures:
