@@ -89,12 +89,12 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     Ok(arguments.set.iter().cloned().chain(given).collect())
 }
 
-/// If `replace`, it replaces the recording of an earlier run.
-pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
+/// Renders a recording for `gyre stress`, in the place of that of an earlier test.
+pub fn replace(simulation: &SimulationConfig, out: &Path) -> Result<(), Failure> {
     match write(None, simulation, out) {
-        Err(SimulatorError::OtherFiles(_)) if replace => {
+        Err(SimulatorError::OtherFiles(_)) => {
             remove_dataset(out).map_err(|error| {
-                format!("cannot replace the recording of an earlier run: {error}, which is another --out")
+                format!("cannot replace the recording of an earlier test: {error}, which is another --out")
             })?;
             write(None, simulation, out)?;
         }

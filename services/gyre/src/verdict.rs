@@ -122,7 +122,7 @@ fn motions(summary: &Value) -> Check {
 
 /// The power above the noise, and azimuths that the host has lost.
 fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>, Failure> {
-    if configuration.streamed().is_some() {
+    if configuration.simulation.is_some() {
         return Ok(Vec::new());
     }
     let (path, options) = (&configuration.source.data, &configuration.dataset);

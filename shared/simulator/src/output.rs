@@ -16,9 +16,6 @@ pub struct OutputConfig {
     /// The times at which the host receives scans, which RADIATE logs instead of the sensor's
     /// times.
     pub host_stamps: HostStamps,
-    /// True if `gyre run` writes the dataset to its results and plays it from there. Default: it is
-    /// played without touching the disk.
-    pub store: bool,
 }
 
 /// A dataset format that can be written.

@@ -7,7 +7,7 @@ use gyre_datasets::{DatasetOptions, Format, find_ground_truth, read_trajectory};
 use gyre_geometry::{OwnedScan, Pose};
 use gyre_simulator::{
     HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
-    output::OutputConfig, write_dataset,
+    output::OutputConfig, remove_dataset, write_dataset,
 };
 
 use crate::all_files;
@@ -222,4 +222,18 @@ fn a_folder_of_another_origin_is_rejected_and_not_changed() {
     *bytes.last_mut().unwrap() ^= 1;
     fs::write(&first, bytes).unwrap();
     rejected(&original, folder.path(), "differs from the image");
+}
+
+#[test]
+fn a_dataset_is_removed_unless_the_folder_has_files_of_others() {
+    let folder = written(&config(OutputFormat::Oxford, 3));
+    let notes = folder.path().join("radar/notes.txt");
+    fs::write(&notes, "rain").unwrap();
+    let before = all_files(folder.path());
+    let refused = remove_dataset(folder.path()).unwrap_err().to_string();
+    assert!(refused.contains("notes.txt"), "{refused}");
+    assert!(all_files(folder.path()) == before);
+    fs::remove_file(&notes).unwrap();
+    remove_dataset(folder.path()).unwrap();
+    assert!(all_files(folder.path()).is_empty());
 }
