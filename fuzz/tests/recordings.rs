@@ -171,7 +171,7 @@ fn use_recording(root: &Path, options: &DatasetOptions) -> Result<(), Failure> {
         dataset.nominal_stamp_ns(index);
         dataset.logged_stamp_ns(index);
     }
-    let report = inspect(root, options, None)?;
+    let report = inspect(root, options)?;
     assert!(!report.to_string().is_empty());
     refused.map_or(Ok(()), |error| Err(error.into()))
 }

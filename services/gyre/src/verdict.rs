@@ -133,7 +133,7 @@ fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>
     let mut read = options.clone();
     read.lost_azimuths = None;
     let dataset = gyre_recording::open(path, &read)?;
-    let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default(), None);
+    let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default());
     let stale = report.figures["rows"]["stale_scans"].as_u64().unwrap_or(0);
     let repaired = &summary["lost"]["scans"];
     Ok(vec![
