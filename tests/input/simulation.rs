@@ -24,7 +24,7 @@ fn a_streamed_run_is_judged_and_is_repeated_by_its_configuration() {
 #[test]
 fn a_part_of_a_simulation_is_the_same_part_of_its_recording() {
     let recording = tempfile::tempdir().unwrap();
-    let words = "simulate --scans 12 --seed 3 --threads 1 \
+    let words = "simulate --scans 12 --seed 3 \
         --set simulation.sensor.profile=cts350x-radiate \
         --set simulation.output.format=oxford --out";
     finished![; words.split_whitespace(); [recording.path()]].succeeded();
