@@ -130,7 +130,7 @@ fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>
     let threshold = i64::from(configuration.odometry.masking.floor());
     let above = threshold - noise;
     let is_ignored = options.lost_azimuths == Some(LostAzimuthOption::Ignore);
-    let mut read = options.clone();
+    let mut read = *options;
     read.lost_azimuths = None;
     let dataset = gyre_recording::open(path, &read)?;
     let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default());
