@@ -117,8 +117,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             folder,
             Box::new(dataset),
             &options,
-            &InspectedLogs::default(),
-            None
+            &InspectedLogs::default()
         )
     );
     let trajectory = drive(&mut RawSweeps::open(folder)?)?;

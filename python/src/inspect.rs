@@ -5,17 +5,15 @@ use std::path::PathBuf;
 use gyre_datasets::InspectedLogs;
 use pyo3::prelude::*;
 
-use crate::{config::Config, errors, trajectory::Trajectory, values};
+use crate::{config::Config, errors, values};
 
-/// Examines a recording: its contents and its apparent faults. With a trajectory of it the clock of
-/// its ground truth is compared. The section `dataset` of `config` determines how the recording is
-/// opened; without `config`, the format does. Raises ReadError.
+/// Examines a recording: its contents and its apparent faults. The section `dataset` of `config`
+/// determines how the recording is opened; without `config`, the format does. Raises ReadError.
 #[pyfunction]
-#[pyo3(signature = (data, trajectory=None, config=None))]
+#[pyo3(signature = (data, config=None))]
 pub fn inspect(
     py: Python<'_>,
     data: PathBuf,
-    trajectory: Option<&Bound<'_, Trajectory>>,
     config: Option<&Bound<'_, Config>>,
 ) -> PyResult<Report> {
     let method = Config::method(config);
@@ -24,11 +22,10 @@ pub fn inspect(
         gnss_topic: method.gnss.topic,
         m_per_tick: method.odometry.sensors.wheels.m_per_tick,
     };
-    let trajectory = trajectory.map(|it| &it.get().0);
     let report = py.detach(|| {
         let dataset = gyre_recording::open(&data, &options)?;
         Ok(gyre_datasets::inspect_dataset(
-            &data, dataset, &options, &logs, trajectory,
+            &data, dataset, &options, &logs,
         ))
     });
     report.map(Report).map_err(errors::open)

@@ -61,7 +61,7 @@ pub fn demo() -> &'static Path {
 pub fn configured(name: &str, settings: &str) -> PathBuf {
     let config: SimulationConfig = toml::from_str(settings).unwrap();
     prepared(name, |recording| {
-        write_dataset(&config, recording, None, &mut |_, _| ()).unwrap();
+        write_dataset(&config, recording, &mut |_, _| ()).unwrap();
     })
 }
 

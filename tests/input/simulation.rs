@@ -1,8 +1,6 @@
 //! Simulated drives with real processes: played by `gyre run` without touching the disk.
 
-use std::fs;
-
-use crate::common::{Run, finished, odometry, recording::images};
+use crate::common::{Run, finished, odometry};
 
 const SCANS: usize = 12;
 const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 12\nseed = 3
@@ -13,7 +11,7 @@ fn streamed() -> Run {
 }
 
 #[test]
-fn a_streamed_run_is_judged_leaves_no_recording_and_is_repeated_by_its_configuration() {
+fn a_streamed_run_is_judged_and_is_repeated_by_its_configuration() {
     let run = streamed();
     let odometry = run.complete();
     let again = Run::of_file(&run.out().join("config.toml"));
@@ -21,30 +19,12 @@ fn a_streamed_run_is_judged_leaves_no_recording_and_is_repeated_by_its_configura
     assert!(run.summary()["evaluation"]["rpe"].is_object());
     assert_eq!(run.summary()["data"], "a simulation");
     assert_eq!(run.result("ground_truth.tum").lines().count(), SCANS);
-    assert!(!run.out().join("recording").exists());
-}
-
-#[test]
-fn a_stored_run_keeps_its_recording_and_gives_the_same_motions() {
-    let run = streamed().set("simulation.output.store=true");
-    let odometry = streamed().complete();
-    assert_eq!(run.complete(), odometry);
-    let stored = images(&run.out().join("recording"));
-    assert_eq!(stored.len(), SCANS);
-    let modified = || fs::metadata(&stored[0]).unwrap().modified().unwrap();
-    let written = modified();
-    run.complete();
-    assert_eq!(modified(), written);
-    // Another drive takes its place.
-    let other = run.clone().set("simulation.seed=4").option("--fresh");
-    other.complete();
-    assert_ne!(run.odometry(), odometry);
 }
 
 #[test]
 fn a_part_of_a_simulation_is_the_same_part_of_its_recording() {
     let recording = tempfile::tempdir().unwrap();
-    let words = "simulate --scans 12 --seed 3 --threads 1 \
+    let words = "simulate --scans 12 --seed 3 \
         --set simulation.sensor.profile=cts350x-radiate \
         --set simulation.output.format=oxford --out";
     finished![; words.split_whitespace(); [recording.path()]].succeeded();

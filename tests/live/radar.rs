@@ -155,8 +155,7 @@ fn motions(odometry: &str) -> Vec<&str> {
 fn datagrams_give_the_motions_of_the_recording() {
     let whole = whole(recording::SCANS);
     let scans = recording::SCANS / 2;
-    let arguments = ["--double", "0.05", "--repeat"];
-    let radar = Radar::sending(&group(1), whole.path(), &arguments);
+    let radar = Radar::sending(&group(1), whole.path(), &["--repeat"]);
     let run = radar.received(scans);
     let live = run.complete();
     run.assert_counts("dropped=0 stages/radar-replay/missing_azimuths=0");

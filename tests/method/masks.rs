@@ -171,8 +171,7 @@ fn scans_that_lost_azimuths_are_drawn_as_they_are_matched() {
 #[test]
 fn a_simulation_is_drawn_as_it_is_rendered() {
     let folder = folder();
-    let simulated =
-        "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 5\noutput = { store = true }\n";
+    let simulated = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 5\n";
     fs::write(folder.path().join("simulated.toml"), simulated).unwrap();
     let mut command = gyre();
     command

@@ -155,7 +155,7 @@ fn inspection_finds_nothing_odd_in_any_format() {
     for format in FORMATS {
         let config = config(format, 4);
         let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
-        let report = inspect(folder.path(), &options(&drive), None)
+        let report = inspect(folder.path(), &options(&drive))
             .unwrap()
             .to_string();
         assert!(report.contains(drive.format().name()), "{report}");

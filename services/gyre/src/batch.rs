@@ -157,7 +157,7 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     if let Some(path) = arguments.inputs.what.last().filter(is_missing) {
         return unchecked(format!("there is nothing at {}", path.display()));
     }
-    let mut configuration = resolve(arguments)?;
+    let configuration = resolve(arguments)?;
     if configuration.is_radar() || configuration.source.repeat {
         return Err(format!(
             "the configuration is of {}, which has no end: a batch is of recordings and simulations",
@@ -175,7 +175,6 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     };
     // The folder is judged by the run that it is of.
     earlier::settle(&out)?;
-    run::place_recording(&mut configuration, &out);
     // By whatever build. `None`: a run reports files that cannot be read, and keeps its poses.
     let is_same = Identity::read(&out)
         .and_then(|begun| begun.has_inputs_of(&configuration, &plan::replaced(&configuration)?))

@@ -1,30 +1,23 @@
 //! `gyre inspect`: reports the contents of a dataset.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use gyre_configuration::terminal::{
     Failure,
     inputs::{Inputs, configuration},
     print,
 };
-use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
+use gyre_datasets::InspectedLogs;
 
 #[derive(Debug, Args)]
 pub struct InspectArguments {
     #[command(flatten)]
     pub inputs: Inputs,
-    /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
-    #[arg(long)]
-    pub trajectory: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
 }
 
 pub fn inspect(arguments: &InspectArguments) -> Result<(), Failure> {
-    let trajectory = arguments.trajectory.as_deref().map(read_trajectory);
-    let trajectory = trajectory.transpose()?;
     let given = arguments.inputs.given_recording()?;
     let configuration = configuration(given.configuration.as_deref(), &arguments.inputs.set)?;
     let path = given.data.unwrap_or(configuration.source.data);
@@ -37,8 +30,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<(), Failure> {
         gnss_topic: configuration.gnss.topic,
         m_per_tick: configuration.odometry.sensors.wheels.m_per_tick,
     };
-    let report =
-        gyre_datasets::inspect_dataset(&path, dataset, &options, &logs, trajectory.as_ref());
+    let report = gyre_datasets::inspect_dataset(&path, dataset, &options, &logs);
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?),
         false => print::values(report),

@@ -113,7 +113,7 @@ pub struct Scans {
     pub count: Option<usize>,
     period_ns: i64,
     bytes: usize,
-    /// `ground_truth.tum` of a simulation that is played without being stored.
+    /// `ground_truth.tum` of a simulation.
     pub truth: Option<Vec<u8>>,
     pub recording: Option<Recording>,
     /// See [`Session::damage`](gyre_results::Session).

@@ -37,10 +37,8 @@ use crate::{
     plan,
     preflight::{self, Preflight},
     progress::Progress,
-    simulate, waiting,
+    waiting,
 };
-
-const RECORDING: &str = "recording";
 
 /// Runs the pipeline and writes its results, however it ended. An interrupted earlier run is
 /// resumed; if it only lacks results, the results are written.
@@ -65,7 +63,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
 
 /// A `fresh` run starts from nothing.
 pub(crate) fn compute(
-    mut configuration: Configuration,
+    configuration: Configuration,
     out: Out,
     fresh: bool,
     form: Form,
@@ -73,7 +71,6 @@ pub(crate) fn compute(
     // An earlier run may have been killed, and this one may be refused before it takes shared
     // memory itself.
     sweep();
-    place_recording(&mut configuration, &out);
     let programs = plan::programs(&configuration)?;
     match Earlier::of(&out, &configuration, &programs, fresh)? {
         Earlier::Foreign(reason) if !earlier::is_closed(&configuration) => Err(reason),
@@ -84,12 +81,6 @@ pub(crate) fn compute(
             }
             ended => ended,
         },
-    }
-}
-
-pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
-    if configuration.stored().is_some() {
-        configuration.source.data = out.join(RECORDING);
     }
 }
 
@@ -114,11 +105,6 @@ fn make_ready(
     ask: &mut preflight::Ask<'_>,
 ) -> Result<Ready, Failure> {
     let unfinished = earlier.unfinished();
-    if let Some(simulation) = configuration.stored() {
-        // A resumed run needs its first recording.
-        let replace = unfinished.is_none();
-        simulate::store(simulation, &configuration.source.data, replace)?;
-    }
     preflight::check_open_files()?;
     // The stages read the options of dataset.toml from here: it may change while they run.
     let resolved = with_stored_options(configuration)?;

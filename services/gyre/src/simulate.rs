@@ -1,7 +1,6 @@
 //! `gyre simulate`: writes a simulated recording.
 
 use std::{
-    num::NonZeroUsize,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -38,9 +37,6 @@ pub struct SimulateArguments {
     /// The format of the files: oxford, boreas or radiate (simulation.output.format).
     #[arg(long)]
     pub format: Option<OutputFormat>,
-    /// Threads to render on. Default: all processors. The files are the same whatever their number.
-    #[arg(long)]
-    pub threads: Option<NonZeroUsize>,
     /// Override a key, as in simulation.drive.speed_mps=5; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -51,11 +47,8 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<(), Failure> {
     let overrides = overrides(arguments)?;
     let configuration = configuration(arguments.configuration.as_deref(), &overrides)?;
     let started = Instant::now();
-    let summary = write(
-        arguments.threads,
-        &configuration.simulation.unwrap_or_default(),
-        &arguments.out,
-    )?;
+    let simulation = configuration.simulation.unwrap_or_default();
+    let summary = write(&simulation, &arguments.out)?;
     let (written, wall_s) = (
         summary.scans - summary.kept,
         started.elapsed().as_secs_f64(),
@@ -89,14 +82,14 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     Ok(arguments.set.iter().cloned().chain(given).collect())
 }
 
-/// If `replace`, it replaces the recording of an earlier run.
-pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
-    match write(None, simulation, out) {
-        Err(SimulatorError::OtherFiles(_)) if replace => {
+/// Renders a recording for `gyre stress`, in the place of that of an earlier test.
+pub fn replace(simulation: &SimulationConfig, out: &Path) -> Result<(), Failure> {
+    match write(simulation, out) {
+        Err(SimulatorError::OtherFiles(_)) => {
             remove_dataset(out).map_err(|error| {
-                format!("cannot replace the recording of an earlier run: {error}, which is another --out")
+                format!("cannot replace the recording of an earlier test: {error}, which is another --out")
             })?;
-            write(None, simulation, out)?;
+            write(simulation, out)?;
         }
         result => {
             result?;
@@ -105,13 +98,9 @@ pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result
     Ok(())
 }
 
-fn write(
-    threads: Option<NonZeroUsize>,
-    simulation: &SimulationConfig,
-    out: &Path,
-) -> Result<Summary, SimulatorError> {
+fn write(simulation: &SimulationConfig, out: &Path) -> Result<Summary, SimulatorError> {
     let mut bar = None;
-    let summary = write_dataset(simulation, out, threads, &mut |done, total| {
+    let summary = write_dataset(simulation, out, &mut |done, total| {
         let bar = bar.get_or_insert_with(|| Bar::new(Some(total)));
         bar.scans(done as u64, done as u64, "simulated".to_owned());
     });

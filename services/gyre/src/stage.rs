@@ -145,14 +145,10 @@ fn play(launch: &Launch) -> Result<StageCounters, RunError> {
         // A build without ROS 2 refuses to begin a run from there.
         _ => {}
     }
-    let simulation = match launch.has_section("simulation") {
-        true => Some(launch.section::<SimulationConfig>("simulation")?),
-        false => None,
-    };
-    // A simulation that was stored is played as a recording.
-    let Some(simulation) = simulation.filter(|simulation| !simulation.output.store) else {
+    if !launch.has_section("simulation") {
         return gyre_stages::radar_replay::run(launch);
-    };
+    }
+    let simulation: SimulationConfig = launch.section("simulation")?;
     let options: DatasetOptions = launch.section("dataset")?;
     let drive = SimulatedDrive::new(&simulation).map_err(|error| input(&error))?;
     let mut dataset = drive.open(&options).map_err(|error| input(&error))?;

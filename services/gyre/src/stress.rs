@@ -89,7 +89,7 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
         simulation.scans = Some(RENDERED);
     }
     let recording = out.join("recording");
-    simulate::store(&simulation, &recording, true)?;
+    simulate::replace(&simulation, &recording)?;
     configuration.source.data = recording;
     Ok(())
 }

@@ -129,7 +129,7 @@ fn motions(summary: &Value) -> Check {
 
 /// The power above the noise, and azimuths that the host has lost.
 fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>, Failure> {
-    if configuration.streamed().is_some() {
+    if configuration.simulation.is_some() {
         return Ok(Vec::new());
     }
     let (path, options) = (&configuration.source.data, &configuration.dataset);
@@ -137,10 +137,10 @@ fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>
     let threshold = i64::from(configuration.odometry.masking.floor());
     let above = threshold - noise;
     let is_ignored = options.lost_azimuths == Some(LostAzimuthOption::Ignore);
-    let mut read = options.clone();
+    let mut read = *options;
     read.lost_azimuths = None;
     let dataset = gyre_recording::open(path, &read)?;
-    let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default(), None);
+    let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default());
     let stale = report.figures["rows"]["stale_scans"].as_u64().unwrap_or(0);
     let repaired = &summary["lost"]["scans"];
     Ok(vec![

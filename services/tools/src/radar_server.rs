@@ -67,9 +67,6 @@ pub struct RadarServerArguments {
     /// Pace: realtime, max (as fast as it is read), or a factor.
     #[arg(long, default_value = "realtime")]
     pub rate: Rate,
-    /// Scans to play. Default: all.
-    #[arg(long)]
-    pub scans: Option<usize>,
     /// Play again and again, with times that advance.
     #[arg(long)]
     pub repeat: bool,
@@ -81,37 +78,15 @@ pub struct RadarServerArguments {
     pub big_endian: bool,
 }
 
-/// Injected faults of a radar and of its network, the same in each playback.
+/// Injected faults of a radar and of its connections, the same in each playback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Args)]
 pub struct Faults {
-    /// Lose this share of the azimuths, or of the datagrams.
+    /// Lose this share of the azimuths.
     #[arg(long = "lose", default_value_t = 0.0, value_name = "SHARE")]
     pub lost: f64,
-    /// Send this share of the datagrams twice.
-    #[arg(
-        long = "double",
-        default_value_t = 0.0,
-        value_name = "SHARE",
-        requires = "udp"
-    )]
-    pub doubled: f64,
-    /// Send this share of the datagrams after the next one.
-    #[arg(
-        long = "swap",
-        default_value_t = 0.0,
-        value_name = "SHARE",
-        requires = "udp"
-    )]
-    pub swapped: f64,
     /// Reset the connections in the middle of every Nth scan.
     #[arg(long, value_name = "N")]
     pub reset_every: Option<u64>,
-    /// Send nothing for --stall-s before every Nth scan.
-    #[arg(long, value_name = "N")]
-    pub stall_every: Option<u64>,
-    /// Length of a stall, s.
-    #[arg(long, default_value_t = 4.0, value_name = "S")]
-    pub stall_s: f64,
     /// Send bytes that are no message in the middle of every Nth scan.
     #[arg(long, value_name = "N")]
     pub garbage_every: Option<u64>,
@@ -125,10 +100,7 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<(), Failure> {
     configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
     let Played { mut dataset, .. } = gyre_configuration::open(&configuration)?;
     let dataset = dataset.as_mut();
-    let mut scans = configuration.source.played(dataset.scans());
-    if let Some(count) = arguments.scans {
-        scans.end = scans.end.min(scans.start.saturating_add(count));
-    }
+    let scans = configuration.source.played(dataset.scans());
     if scans.is_empty() {
         return Err(format!("{} has no scan to play", configuration.data()).into());
     }
@@ -168,17 +140,15 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<(), Failure> {
         scans: 0,
         lost_azimuths: 0,
         resets: 0,
-        stalls: 0,
     };
     player.play_all(dataset, scans, scan)?;
     let datagrams = match &player.output {
         Output::Clients(_) => 0,
         Output::Group(group) => group.lost,
     };
-    let (scans, azimuths) = (player.scans, player.lost_azimuths);
-    let (resets, stalls) = (player.resets, player.stalls);
+    let (scans, azimuths, resets) = (player.scans, player.lost_azimuths, player.resets);
     print::line(format_args!(
-        "played {scans} scans, lost {azimuths} azimuths and {datagrams} datagrams, reset the connections {resets} times, stalled {stalls} times"
+        "played {scans} scans, lost {azimuths} azimuths and {datagrams} datagrams, reset the connections {resets} times"
     ))
 }
 
@@ -239,7 +209,6 @@ struct Player<'a> {
     scans: u64,
     lost_azimuths: u64,
     resets: u64,
-    stalls: u64,
 }
 
 impl<'a> Player<'a> {
@@ -280,14 +249,6 @@ impl<'a> Player<'a> {
         }
         let faults = self.arguments.faults;
         let number = self.scans;
-        if is_nth(number, faults.stall_every) {
-            self.stalls += 1;
-            self.started = None;
-            let due = Instant::now() + Duration::from_secs_f64(faults.stall_s.clamp(0.0, 3600.0));
-            if !sleep_until(due, self.stop) {
-                return false;
-            }
-        }
         for row in 0..scan.geometry.azimuths {
             if !self.wait_until_due(scan.stamp_ns[row]) {
                 return false;
@@ -295,8 +256,7 @@ impl<'a> Player<'a> {
             self.sweep_counter = self.sweep_counter.wrapping_add(1);
             // A row that was not measured was not sent by the radar either.
             let is_measured = scan.flags[row] & flag::MEASURED != 0;
-            let is_lost = matches!(self.output, Output::Clients(_))
-                && uniform(number, row as u64) < faults.lost;
+            let is_lost = uniform(number, row as u64) < faults.lost;
             if !is_measured || is_lost {
                 self.lost_azimuths += 1;
                 continue;
@@ -369,8 +329,8 @@ fn is_nth(scan: u64, every: Option<u64>) -> bool {
     every.is_some_and(|every| (scan + 1).is_multiple_of(every.max(1)))
 }
 
-/// Returns a number from 0 to 1 that scan and row, or datagram and fault, determine.
-pub(super) fn uniform(scan: u64, row: u64) -> f64 {
+/// Returns a number from 0 to 1 that scan and row determine.
+fn uniform(scan: u64, row: u64) -> f64 {
     ChaCha8Rng::seed_from_u64(scan << 16 | row).random()
 }
 

@@ -55,9 +55,6 @@ pub struct StressArguments {
     /// all are stopped or killed.
     #[arg(long = "stage", value_name = "NAME", value_parser = stage)]
     pub stages: Vec<StageId>,
-    /// For the order of stages that are stopped or killed.
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
 }
 
 /// Parses a duration: 2 s to a week.

@@ -254,8 +254,8 @@ mod tests {
 
     #[test]
     fn each_format_has_constants_that_can_be_read() {
-        for format in Format::ALL {
-            assert!(constants(format).is_ok(), "{format}");
+        for format in Format::OF_IMAGES {
+            assert!(constants(*format).is_ok(), "{format}");
         }
         let radiate = constants(Format::Radiate).unwrap();
         assert_eq!(radiate.azimuth_eccentricity_rad, Some(0.0018));

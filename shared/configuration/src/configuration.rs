@@ -234,22 +234,8 @@ impl Configuration {
         place.name() == stage
     }
 
-    /// Returns the simulation, if it is played without being stored.
-    pub fn streamed(&self) -> Option<&SimulationConfig> {
-        self.simulation
-            .as_ref()
-            .filter(|simulation| !simulation.output.store)
-    }
-
-    /// Returns the simulation, if it is stored and then played as a recording.
-    pub fn stored(&self) -> Option<&SimulationConfig> {
-        self.simulation
-            .as_ref()
-            .filter(|simulation| simulation.output.store)
-    }
-
-    /// Plays this recording instead, or streams the simulation even if a run would store it: for
-    /// commands that read the scans without a run. Streamed and stored scans are byte-identical.
+    /// Plays this recording instead, or the simulation with the constants of its radar: for
+    /// commands that read the scans without a run.
     #[must_use]
     pub fn streaming(mut self, data: Option<&Path>) -> Self {
         if let Some(data) = data {
@@ -257,8 +243,7 @@ impl Configuration {
             self.source.kind = SourceKind::Recording;
             self.source.data = data.to_owned();
         }
-        if let Some(simulation) = &mut self.simulation {
-            simulation.output.store = false;
+        if let Some(simulation) = &self.simulation {
             self.dataset = self.dataset.or(&simulation.dataset_options());
         }
         self
@@ -274,7 +259,7 @@ impl Configuration {
         if self.is_side(Side::Base) {
             return format!("the robot on the link {}", self.link.name);
         }
-        match self.streamed() {
+        match &self.simulation {
             Some(_) => "a simulation".to_owned(),
             None => self.source.data.display().to_string(),
         }

@@ -19,7 +19,7 @@ fn refused<T>(reason: &str) -> Result<T, Failure> {
 
 pub struct Played {
     pub dataset: Box<dyn Dataset>,
-    /// `ground_truth.tum` of a simulation that is played without being stored.
+    /// `ground_truth.tum` of a simulation.
     pub truth: Option<Vec<u8>>,
     pub samples: ScanSamples,
 }
@@ -33,7 +33,7 @@ pub fn open(configuration: &Configuration) -> Result<Played, Failure> {
             "the configuration is of {radar}, but this needs a recording: name one"
         ));
     }
-    let drive = configuration.streamed().map(SimulatedDrive::new);
+    let drive = configuration.simulation.as_ref().map(SimulatedDrive::new);
     let drive = drive.transpose()?;
     let mut dataset = match &drive {
         Some(drive) => drive.open(options)?,
@@ -109,7 +109,7 @@ pub fn simulated_samples(
 /// results in `out`; `None` without GNSS.
 pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<SampleLog>, Failure> {
     let (config, data) = (&configuration.gnss, &configuration.source.data);
-    let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
+    let is_in_folder = configuration.simulation.is_none() && !data.as_os_str().is_empty();
     match config.kind == SensorKind::Auto && !is_in_folder {
         true => refused(
             "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\"",
@@ -122,7 +122,7 @@ pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<Samp
 pub fn with_stored_options(configuration: &Configuration) -> Result<Configuration, OpenError> {
     let mut resolved = configuration.clone();
     let data = &configuration.source.data;
-    if configuration.streamed().is_none() && !data.as_os_str().is_empty() {
+    if configuration.simulation.is_none() && !data.as_os_str().is_empty() {
         let stored = gyre_recording::stored_options(data)?;
         resolved.dataset = resolved.dataset.or(&stored);
     }
@@ -132,7 +132,7 @@ pub fn with_stored_options(configuration: &Configuration) -> Result<Configuratio
 /// Returns the identification of a recording; `None`: its configuration does.
 pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, Failure> {
     let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
-    if !plays_scans || configuration.streamed().is_some() {
+    if !plays_scans || configuration.simulation.is_some() {
         return Ok(None);
     }
     let played = open(configuration)?;

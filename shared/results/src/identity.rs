@@ -28,8 +28,7 @@ pub struct Identity {
     programs: Programs,
     /// The options to read the recording, including its `dataset.toml`.
     dataset: DatasetOptions,
-    /// The recording; `None` for a simulation that is not stored, which its configuration
-    /// determines.
+    /// The recording; `None` for a simulation, which its configuration determines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     recording: Option<Fingerprint>,
     pub configuration: toml::Table,

@@ -110,7 +110,12 @@ fn slam_of(configuration: &Configuration, out: &Out) -> Option<Slam> {
 
 pub fn truth_of(configuration: &Configuration, out: &Path) -> Option<PathBuf> {
     let given = configuration.run.ground_truth.clone();
-    let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
+    let simulated = || {
+        configuration
+            .simulation
+            .is_some()
+            .then(|| out.join(SIMULATED_TRUTH))
+    };
     let data = Some(&configuration.source.data).filter(|data| !data.as_os_str().is_empty());
     let beside = || data.and_then(|data| find_ground_truth(data));
     given.or_else(simulated).or_else(beside)

@@ -30,7 +30,7 @@ pub use beside::{
 pub use body::{Body, Moving};
 pub use config::{DriveConfig, Realism, SimulationConfig};
 pub use error::SimulatorError;
-pub use output::{HostStamps, OutputFormat};
+pub use output::OutputFormat;
 pub use path::{BlockLoop, Path};
 pub use profile::{Profile, Sampling};
 pub use sensor::{Scene, Sensor, SensorConfig, SweepTime};

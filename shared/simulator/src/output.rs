@@ -13,12 +13,6 @@ pub struct OutputConfig {
     /// Format of the files. Default: in a run that of `dataset.format`, else Oxford's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<OutputFormat>,
-    /// The times at which the host receives scans, which RADIATE logs instead of the sensor's
-    /// times.
-    pub host_stamps: HostStamps,
-    /// True if `gyre run` writes the dataset to its results and plays it from there. Default: it is
-    /// played without touching the disk.
-    pub store: bool,
 }
 
 /// A dataset format that can be written.
@@ -59,16 +53,4 @@ impl OutputFormat {
             _ => None,
         }
     }
-}
-
-/// The delays with which a host receives scans.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum HostStamps {
-    /// The same delay for each scan.
-    #[default]
-    Even,
-    /// About once in 64 scans the host stalls for up to 1.4 s and then catches up, as in RADIATE's
-    /// recordings.
-    Stalling,
 }

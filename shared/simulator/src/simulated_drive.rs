@@ -166,10 +166,8 @@ impl SimulatedDrive {
     }
 
     fn stamps(&self) -> Option<String> {
-        let config = self.simulator.config();
-        let host = config.output.host_stamps;
-        (self.output == OutputFormat::Radiate)
-            .then(|| radiate::stamps(&self.simulator, host, config.sensor_seed()))
+        let is_radiate = self.output == OutputFormat::Radiate;
+        is_radiate.then(|| radiate::stamps(&self.simulator))
     }
 
     /// Returns the azimuths of a scan that the host loses, in order: see

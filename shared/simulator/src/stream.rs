@@ -25,11 +25,6 @@ impl Stream {
         Self(1 + index)
     }
 
-    /// Host stalls, by block of scans with one stall each.
-    pub fn stall(block: u64) -> Self {
-        Self((1 << 43) + block)
-    }
-
     /// The azimuths of a scan that the host loses, by its number.
     pub fn lost(index: u64) -> Self {
         Self((1 << 44) + index)

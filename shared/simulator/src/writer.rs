@@ -3,7 +3,6 @@
 mod resume;
 
 use std::fs::{self, File};
-use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
@@ -28,14 +27,13 @@ pub struct Summary {
     pub duration_s: f64,
 }
 
-/// Writes the dataset of `config` to the folder `out` on `threads` threads, by default one for each
-/// processor, and calls `progress(done, total)` for each image. The files do not depend on the
-/// number of threads. Images of an earlier call with the same configuration are kept; the first and
-/// the last of them are compared with newly rendered ones.
+/// Writes the dataset of `config` to the folder `out` on all processors, on whose number the files
+/// do not depend, and calls `progress(done, total)` for each image. Images of an earlier call with
+/// the same configuration are kept; the first and the last of them are compared with newly rendered
+/// ones.
 pub fn write_dataset(
     config: &SimulationConfig,
     out: &Path,
-    threads: Option<NonZeroUsize>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Summary, SimulatorError> {
     let drive = SimulatedDrive::new(config)?;
@@ -50,9 +48,7 @@ pub fn write_dataset(
     let kept = drive.scans() - missing.len();
     progress(kept, drive.scans());
     let mut written = |done| progress(kept + done, drive.scans());
-    let threads = threads.or(available_parallelism().ok());
-    let threads = threads.map_or(1, NonZeroUsize::get);
-    write_images(&drive, &missing, threads, &images, &mut written)?;
+    write_images(&drive, &missing, &images, &mut written)?;
     Ok(summary(&drive, kept))
 }
 
@@ -108,10 +104,10 @@ fn write_side_files(drive: &SimulatedDrive, out: &Path) -> Result<(), SimulatorE
 fn write_images(
     drive: &SimulatedDrive,
     missing: &[usize],
-    threads: usize,
     folder: &Path,
     progress: &mut dyn FnMut(usize),
 ) -> Result<(), SimulatorError> {
+    let threads = available_parallelism().map_or(1, usize::from);
     let (next, size) = (AtomicUsize::new(0), drive.image_size());
     let (sender, results) = mpsc::channel();
     std::thread::scope(|scope| {

@@ -20,7 +20,7 @@ fn config(scans: usize) -> SimulationConfig {
 
 fn generate(config: &SimulationConfig) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    write_dataset(config, folder.path(), None, &mut |_, _| {}).unwrap();
+    write_dataset(config, folder.path(), &mut |_, _| {}).unwrap();
     folder
 }
 

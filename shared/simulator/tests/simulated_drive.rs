@@ -6,8 +6,8 @@ use std::{fs, path::Path};
 use gyre_datasets::{DatasetOptions, Format, find_ground_truth, read_trajectory};
 use gyre_geometry::{OwnedScan, Pose};
 use gyre_simulator::{
-    HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
-    output::OutputConfig, write_dataset,
+    OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary, output::OutputConfig,
+    remove_dataset, write_dataset,
 };
 
 use crate::all_files;
@@ -19,19 +19,17 @@ const FORMATS: [OutputFormat; 3] = [
 ];
 
 fn config(format: OutputFormat, scans: usize) -> SimulationConfig {
-    let output = OutputConfig {
-        format: Some(format),
-        ..OutputConfig::default()
-    };
     SimulationConfig {
         scans: Some(scans),
-        output,
+        output: OutputConfig {
+            format: Some(format),
+        },
         ..SimulationConfig::default()
     }
 }
 
 fn write(config: &SimulationConfig, out: &Path) -> Result<Summary, SimulatorError> {
-    write_dataset(config, out, None, &mut |_, _| {})
+    write_dataset(config, out, &mut |_, _| {})
 }
 
 fn written(config: &SimulationConfig) -> tempfile::TempDir {
@@ -146,23 +144,6 @@ fn pose_at(drive: &SimulatedDrive, stamp_ns: i64) -> Pose {
 }
 
 #[test]
-fn a_stalling_host_shifts_the_logged_times_and_not_the_sensors_clock() {
-    let mut config = config(OutputFormat::Radiate, 40);
-    config.output.host_stamps = HostStamps::Stalling;
-    let drive = SimulatedDrive::new(&config).unwrap();
-    let source = Box::new(drive.renderer());
-    let dataset = gyre_datasets::open_source(source, &drive.dataset_options()).unwrap();
-    let late_ns = |index: usize| {
-        dataset.logged_stamp_ns(index).unwrap() - dataset.nominal_stamp_ns(index).unwrap()
-    };
-    assert!((0..40).map(late_ns).max().unwrap() > 150_000_000);
-    for index in 0..40 {
-        let error_ns = dataset.nominal_stamp_ns(index).unwrap() - drive.stamp_ns(index);
-        assert!(error_ns.abs() < 1_000_000, "scan {index}: {error_ns} ns");
-    }
-}
-
-#[test]
 fn an_interrupted_dataset_is_completed_and_extended_by_more_scans() {
     for format in FORMATS {
         let (cut, config) = (written(&config(format, 5)), config(format, 6));
@@ -179,7 +160,7 @@ fn an_interrupted_dataset_is_completed_and_extended_by_more_scans() {
         let modified = || fs::metadata(image(1)).unwrap().modified().unwrap();
         let (untouched, mut seen) = (modified(), Vec::new());
         let mut see = |done: usize, total: usize| seen.push((done, total));
-        let summary = write_dataset(&config, cut.path(), None, &mut see).unwrap();
+        let summary = write_dataset(&config, cut.path(), &mut see).unwrap();
         assert_eq!((summary.scans, summary.kept), (6, 3));
         assert!((summary.duration_s - 1.25).abs() < 1e-9 && summary.path_m > 2.0);
         assert_eq!(seen, [(3, 6), (4, 6), (5, 6), (6, 6)]);
@@ -222,4 +203,18 @@ fn a_folder_of_another_origin_is_rejected_and_not_changed() {
     *bytes.last_mut().unwrap() ^= 1;
     fs::write(&first, bytes).unwrap();
     rejected(&original, folder.path(), "differs from the image");
+}
+
+#[test]
+fn a_dataset_is_removed_unless_the_folder_has_files_of_others() {
+    let folder = written(&config(OutputFormat::Oxford, 3));
+    let notes = folder.path().join("radar/notes.txt");
+    fs::write(&notes, "rain").unwrap();
+    let before = all_files(folder.path());
+    let refused = remove_dataset(folder.path()).unwrap_err().to_string();
+    assert!(refused.contains("notes.txt"), "{refused}");
+    assert!(all_files(folder.path()) == before);
+    fs::remove_file(&notes).unwrap();
+    remove_dataset(folder.path()).unwrap();
+    assert!(all_files(folder.path()).is_empty());
 }

@@ -87,7 +87,6 @@ fn delays_s(host_stamps: HostStamps) -> Result<Vec<f64>, SimulatorError> {
     let output = OutputConfig {
         format: Some(OutputFormat::Radiate),
         host_stamps,
-        ..OutputConfig::default()
     };
     let mut config = SimulationConfig {
         scans: Some(240),

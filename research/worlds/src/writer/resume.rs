@@ -127,12 +127,10 @@ fn other_dataset(out: &Path) -> SimulatorError {
 
 /// The configuration without the keys that do not change the content of a scan.
 fn same_scans(config: &SimulationConfig) -> SimulationConfig {
-    let mut config = SimulationConfig {
+    SimulationConfig {
         scans: Some(1),
         ..config.resolved()
-    };
-    config.output.store = false;
-    config
+    }
 }
 
 /// Checks an image against a newly rendered one: another build may render differently, and the file

@@ -19,13 +19,11 @@ use gyre_storage as storage;
 use super::{CONFIGURATION, is_complete, make_way};
 
 pub fn is_closed(configuration: &Configuration) -> bool {
-    // A recording that was simulated lies in the folder, and is played from there.
-    configuration.stored().is_none()
-        && match configuration.run.earlier {
-            EarlierRun::Auto => configuration.run.mode == Mode::Live,
-            EarlierRun::Refuse => false,
-            EarlierRun::Close => true,
-        }
+    match configuration.run.earlier {
+        EarlierRun::Auto => configuration.run.mode == Mode::Live,
+        EarlierRun::Refuse => false,
+        EarlierRun::Close => true,
+    }
 }
 
 /// Closes a run; returns the folder of the new one.

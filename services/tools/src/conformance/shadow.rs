@@ -65,9 +65,6 @@ pub struct ShadowArguments {
     /// Items to compare. Default: until the run ends.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub scans: Option<u64>,
-    /// Time after which it ends, s.
-    #[arg(long, value_name = "S", value_parser = seconds)]
-    pub duration: Option<Duration>,
     /// Write shadow.json, shadow.csv with a row for each item, and the program's output,
     /// shadow.txt, to this folder.
     #[arg(long, value_name = "DIR")]

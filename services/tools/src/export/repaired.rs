@@ -72,7 +72,7 @@ fn recording(source: &Source) -> Result<Scans, Failure> {
         );
     };
     let data = configuration.data();
-    if configuration.streamed().is_some() {
+    if configuration.simulation.is_some() {
         return Err(format!("the run was of {data}, which is not on disk: gyre simulate writes it, without lost azimuths if effects.lost_azimuths is false").into());
     }
     let Some(scans) = source.scans()? else {

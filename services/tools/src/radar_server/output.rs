@@ -18,7 +18,7 @@ use gyre_colossus::{
 };
 use gyre_configuration::terminal::Failure;
 
-use super::{Faults, RadarServerArguments, uniform, unserved};
+use super::{RadarServerArguments, unserved};
 
 /// The longest time between two checks for a request to stop.
 const SLICE: Duration = Duration::from_millis(50);
@@ -51,9 +51,7 @@ impl Output {
                 socket: UdpSocket::bind((interface, 0)).map_err(unserved)?,
                 to,
                 wait: arguments.wait_s,
-                faults: arguments.faults,
                 number: 0,
-                held: None,
                 lost: 0,
             };
             let (output, address) = (Self::Group(group), format!("udp://{to}"));
@@ -135,10 +133,8 @@ pub struct Group {
     to: SocketAddrV4,
     /// The time before the first scan, for which only the radar's description is sent.
     wait: Duration,
-    faults: Faults,
     number: u32,
-    /// A datagram that is sent after the next one.
-    held: Option<Vec<u8>>,
+    /// Datagrams that this machine could not send.
     pub lost: u64,
 }
 
@@ -151,41 +147,13 @@ impl Group {
         self.pass(&datagram);
     }
 
-    /// Sends an azimuth in several datagrams, with the faults of a network.
+    /// Sends an azimuth in several datagrams.
     pub fn send(&mut self, radar: &Configuration, azimuth: &Azimuth<'_>) {
-        let (first, mut next) = (self.number, self.number);
-        let mut datagrams = Vec::new();
+        let mut next = self.number;
         write_azimuth(radar, azimuth, &mut next, &mut |datagram| {
-            datagrams.push(datagram.to_vec());
+            self.pass(datagram);
         });
         self.number = next;
-        for (k, datagram) in datagrams.into_iter().enumerate() {
-            self.send_or_fail(u64::from(first.wrapping_add(k as u32)), datagram);
-        }
-    }
-
-    /// Loses, doubles or delays a datagram, as its number determines.
-    fn send_or_fail(&mut self, number: u64, datagram: Vec<u8>) {
-        let [is_lost, is_doubled, is_swapped] = [
-            uniform(number, 0) < self.faults.lost,
-            uniform(number, 1) < self.faults.doubled,
-            uniform(number, 2) < self.faults.swapped,
-        ];
-        if is_lost {
-            self.lost += 1;
-            return;
-        }
-        if self.held.is_none() && is_swapped {
-            self.held = Some(datagram);
-            return;
-        }
-        self.pass(&datagram);
-        if is_doubled {
-            self.pass(&datagram);
-        }
-        if let Some(held) = self.held.take() {
-            self.pass(&held);
-        }
     }
 
     /// Sends a datagram as it is. Nobody need be there to receive it.

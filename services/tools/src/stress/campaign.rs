@@ -145,7 +145,7 @@ impl Campaign<'_> {
                 [] => self.tested.stages.as_slice(),
                 stages => stages,
             };
-            Some((kind, stages.to_vec(), arguments.seed))
+            Some((kind, stages.to_vec()))
         };
         match scenario {
             Scenario::Bursts => {

@@ -45,7 +45,7 @@ pub struct Setup {
     pub burst: u64,
     /// Helpers that load the machine while it is measured.
     pub loads: Vec<Work>,
-    pub faults: Option<(FaultKind, Vec<StageId>, u64)>,
+    pub faults: Option<(FaultKind, Vec<StageId>)>,
     pub played: Vec<PlayedFault>,
 }
 

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 /// Scans a second of the radars that most users have.
 pub const RADAR_HZ: f64 = 4.0;
@@ -28,26 +28,20 @@ pub enum Judged {
 /// Defines the scenarios: name, judgement, and a line that describes it.
 macro_rules! scenarios {
     ($($scenario:ident: $name:literal, $judged:ident, $line:literal;)+) => {
-        /// The load or the faults of a run while its latency is measured.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Scenario {
-            $(
-                #[doc = concat!("`", $name, "`: ", $line, ".")]
-                $scenario,
-            )+
+        gyre_geometry::named! {
+            /// The load or the faults of a run while its latency is measured, in the order of
+            /// execution. The names are those on the command line and in `[budget.NAME]`.
+            #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+            #[serde(rename_all = "kebab-case")]
+            pub enum Scenario {
+                $(
+                    #[doc = concat!("`", $name, "`: ", $line, ".")]
+                    $scenario = $name,
+                )+
+            }
         }
 
         impl Scenario {
-            /// All scenarios, in the order of execution.
-            pub const ALL: [Self; [$($name,)+].len()] = [$(Self::$scenario,)+];
-
-            /// Returns the name on the command line and in `[budget.NAME]`.
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$scenario => $name,)+
-                }
-            }
-
             /// Returns the judgement of its figures.
             pub const fn judged(self) -> Judged {
                 match self {
@@ -122,16 +116,9 @@ impl FromStr for Scenario {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL.into_iter().find(|it| it.name() == name);
-        found.ok_or_else(|| {
+        Self::by_name(name).ok_or_else(|| {
             let names = Self::ALL.map(Self::name).join(", ");
             format!("there is no scenario `{name}`; there are {names}")
         })
-    }
-}
-
-impl Serialize for Scenario {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
     }
 }

@@ -12,7 +12,7 @@ use std::{
 };
 
 use gyre_geometry::{PolarScan, scan::OwnedScan};
-use gyre_radar::{DopplerEstimator, NoDoppler, PointsConfig, trajectory::Trajectory};
+use gyre_radar::{DopplerEstimator, NoDoppler, PointsConfig};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -39,17 +39,10 @@ pub struct Report {
 }
 
 /// Examines the dataset at `root`.
-///
-/// With a `trajectory` of the dataset (an odometry result), the clock of each stamped ground truth
-/// is compared with it.
-pub fn inspect(
-    root: &Path,
-    options: &DatasetOptions,
-    trajectory: Option<&Trajectory>,
-) -> Result<Report, OpenError> {
+pub fn inspect(root: &Path, options: &DatasetOptions) -> Result<Report, OpenError> {
     let dataset = open(root, options)?;
     let logs = InspectedLogs::default();
-    Ok(inspect_dataset(root, dataset, options, &logs, trajectory))
+    Ok(inspect_dataset(root, dataset, options, &logs))
 }
 
 #[derive(Clone, Debug, Default)]
@@ -65,7 +58,6 @@ pub fn inspect_dataset(
     mut dataset: Box<dyn Dataset>,
     options: &DatasetOptions,
     logs: &InspectedLogs,
-    trajectory: Option<&Trajectory>,
 ) -> Report {
     let dataset = dataset.as_mut();
     let mut report = Report {
@@ -93,7 +85,7 @@ pub fn inspect_dataset(
     read.rows
         .findings(&mut report, read.scans_read, &read.scan.geometry);
     read.scans(&mut report);
-    ground_truth::examine(&mut report, dataset, trajectory);
+    ground_truth::examine(&mut report, dataset);
     logs::examine(&mut report, dataset, logs, timing.as_ref());
     report
 }

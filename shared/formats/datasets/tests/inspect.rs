@@ -3,12 +3,11 @@
 use crate::common::{
     PERIOD_US, START_US, Sweep, real, write_oxford, write_png, write_radiate, written,
 };
-use gyre_datasets::{DatasetOptions, Report, inspect, read_trajectory};
-use gyre_radar::Trajectory;
+use gyre_datasets::{DatasetOptions, Report, inspect};
 use serde_json::Value;
 
-fn report(folder: &str, trajectory: Option<&Trajectory>) -> Option<Report> {
-    let report = inspect(&real(folder)?, &DatasetOptions::default(), trajectory).unwrap();
+fn report(folder: &str) -> Option<Report> {
+    let report = inspect(&real(folder)?, &DatasetOptions::default()).unwrap();
     println!("{report}");
     Some(report)
 }
@@ -40,7 +39,7 @@ fn assert_mentions(report: &Report, words: &[&str]) {
 
 #[test]
 fn stalls_stamps_and_transposed_images_of_radiate_are_reported() {
-    let Some(report) = report("radiate-2019-02-12", None) else {
+    let Some(report) = report("radiate-2019-02-12") else {
         return;
     };
     assert_eq!(report.scans, 466);
@@ -66,31 +65,8 @@ fn stalls_stamps_and_transposed_images_of_radiate_are_reported() {
 }
 
 #[test]
-fn a_late_ground_truth_is_detected_with_a_trajectory() {
-    let Some(root) = real("radiate-2019-02-12") else {
-        return;
-    };
-    let truth = read_trajectory(&root.join("ground_truth.tum")).unwrap();
-    // Like an odometry result: every fifth pose, 4 Hz.
-    let stamps = truth.stamp_ns.unwrap().into_iter().step_by(5).collect();
-    let result = Trajectory::timed(stamps, truth.poses.into_iter().step_by(5).collect());
-    let report = report("radiate-2019-02-12", Some(&result)).unwrap();
-    let delay_s = |name: &str| {
-        let truths = at(&report, "/ground_truths").as_array().unwrap();
-        let is_it = |it: &&Value| it["file"].as_str().unwrap().ends_with(name);
-        let clock = &truths.iter().find(is_it).unwrap()["clock"];
-        clock["delay_s"].as_f64().unwrap()
-    };
-    assert!(delay_s("ground_truth.tum").abs() < 0.1);
-    let delay_s = delay_s("gnss_as_logged.tum");
-    assert!((1.4..1.7).contains(&delay_s), "{delay_s}");
-    assert_mentions(&report, &["gnss_as_logged.tum", "late"]);
-    assert!(!mentions(&report, &["ground_truth.tum is"]));
-}
-
-#[test]
 fn resolution_and_bursts_of_oxford_are_reported() {
-    let Some(report) = report("oxford-2019-01-10-14-36-48", None) else {
+    let Some(report) = report("oxford-2019-01-10-14-36-48") else {
         return;
     };
     assert_mentions(&report, &["0.0438 m", "0.0432"]);
@@ -107,7 +83,7 @@ fn resolution_and_bursts_of_oxford_are_reported() {
 
 #[test]
 fn boreas_rt_and_fomo_are_reported() {
-    let Some(rt) = report("samples/boreas-rt-2024-12-03", None) else {
+    let Some(rt) = report("samples/boreas-rt-2024-12-03") else {
         return;
     };
     assert_eq!(rt.format.name(), "boreas-rt");
@@ -115,7 +91,7 @@ fn boreas_rt_and_fomo_are_reported() {
     assert_eq!(at(&rt, "/rows/not_measured"), 0);
     assert_mentions(&rt, &["Byte 10 alternates", "chirp"]);
     assert_mentions(&rt, &["only one scan"]);
-    let fomo = report("samples/fomo-2025-10-14", None).unwrap();
+    let fomo = report("samples/fomo-2025-10-14").unwrap();
     assert_eq!(fomo.format.name(), "fomo");
     assert_eq!(at(&fomo, "/rows/chirps"), "unknown");
     assert_eq!(at(&fomo, "/rows/not_measured"), 0);
@@ -145,7 +121,7 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     }
     pixels[39 * sweep.width() + 8..][..2].copy_from_slice(&5_u16.to_le_bytes());
     write_png(&files[9], sweep.width(), sweep.rows, &pixels);
-    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+    let report = inspect(root.path(), &DatasetOptions::default()).unwrap();
     assert_eq!(report.scans, 11);
     assert_eq!(at(&report, "/timing/missing_scans"), 1);
     assert_eq!(at(&report, "/timing/gaps/0/scan"), 4);
@@ -166,7 +142,7 @@ fn a_dataset_without_faults_has_few_findings() {
     write_radiate(root.path(), 9);
     // What macOS stores beside a file is no ground truth.
     std::fs::write(root.path().join("._ground_truth.tum"), "Mac OS X").unwrap();
-    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+    let report = inspect(root.path(), &DatasetOptions::default()).unwrap();
     for list in [
         "/ground_truths",
         "/timing/stalls",
@@ -184,7 +160,7 @@ fn a_dataset_without_faults_has_few_findings() {
 fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
     let folder = tempfile::tempdir().unwrap();
     write_oxford(folder.path(), 8);
-    let plain = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    let plain = inspect(folder.path(), &DatasetOptions::default()).unwrap();
     assert!(at(&plain, "/gyro").is_null() && !plain.to_string().contains("gyro"));
     let first_ns = at(&plain, "/timing/first_ns").as_i64().unwrap();
     // 100 Hz for 10 s from half a second before the first scan; x points up; it turns for 4 s.
@@ -197,7 +173,7 @@ fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
     let header = "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x,accel_y,accel_z\n";
     let text = header.to_owned() + &rows.collect::<String>();
     written(&folder, "imu.csv", &text);
-    let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    let report = inspect(folder.path(), &DatasetOptions::default()).unwrap();
     println!("{report}");
     assert_eq!(at(&report, "/gyro/samples"), 980);
     assert!((number(&report, "/gyro/rate_hz") - 100.0).abs() < 1e-6);
@@ -214,7 +190,7 @@ fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
     let line = "imu.csv: 980 samples of 100.0 Hz, 2.0 % missing";
     assert!(report.to_string().contains(line));
     written(&folder, "imu.csv", "a,b\n");
-    let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    let report = inspect(folder.path(), &DatasetOptions::default()).unwrap();
     assert_mentions(&report, &["cannot be used", "no angular rates"]);
 }
 
@@ -222,7 +198,7 @@ fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
 fn the_logs_of_wheels_and_gnss_are_told_with_what_they_say_and_their_faults() {
     let folder = tempfile::tempdir().unwrap();
     write_oxford(folder.path(), 8);
-    let examine = || inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    let examine = || inspect(folder.path(), &DatasetOptions::default()).unwrap();
     let first_ns = at(&examine(), "/timing/first_ns").as_i64().unwrap();
     let write = |name: &str, head: &str, row: &dyn Fn(i64) -> String| {
         let rows: String = (0..100).map(row).collect();

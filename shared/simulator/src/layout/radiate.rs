@@ -7,18 +7,11 @@ use std::fmt::Write as _;
 use rand::Rng;
 
 use crate::error::SimulatorError;
-use crate::output::HostStamps;
 use crate::simulator::Simulator;
 use crate::stream::Stream;
 
 /// Sensor periods that a reader can recognise, microseconds.
 const PERIODS_US: std::ops::RangeInclusive<i64> = 200_000..=300_000;
-/// One host stall in this many scans: a recording has seven in 466.
-const STALL_EVERY: usize = 64;
-/// Duration of a stall, seconds.
-const STALL_S: std::ops::Range<f64> = 0.3..1.4;
-/// Time between scans while the host catches up, microseconds.
-const CATCH_UP_US: i64 = 5_000;
 
 pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     let sampling = simulator.sampling();
@@ -71,11 +64,11 @@ pub(crate) fn stamp_ns(simulator: &Simulator, index: usize) -> i64 {
 }
 
 /// `Navtech_Polar.txt`: the nanoseconds follow the dot *without leading zeros*.
-pub(crate) fn stamps(simulator: &Simulator, host: HostStamps, seed: u64) -> String {
+pub(crate) fn stamps(simulator: &Simulator) -> String {
     let mut text = String::new();
     for index in 0..simulator.scans() {
-        let received_us = simulator.time(index).start_us + delay_us(simulator, host, seed, index);
-        let (seconds, rest_us) = (received_us / 1_000_000, received_us % 1_000_000);
+        let start_us = simulator.time(index).start_us;
+        let (seconds, rest_us) = (start_us / 1_000_000, start_us % 1_000_000);
         let _ = writeln!(
             text,
             "Frame: {:06} Time: {seconds}.{}",
@@ -84,22 +77,6 @@ pub(crate) fn stamps(simulator: &Simulator, host: HostStamps, seed: u64) -> Stri
         );
     }
     text
-}
-
-/// Delay of the host for a scan, microseconds, less the shortest delay.
-fn delay_us(simulator: &Simulator, host: HostStamps, seed: u64, index: usize) -> i64 {
-    if host == HostStamps::Even {
-        return 0;
-    }
-    let block = index / STALL_EVERY;
-    let mut rng = Stream::stall(block as u64).generator(seed);
-    let begins = block * STALL_EVERY + rng.random_range(8..STALL_EVERY / 2);
-    let ends_us = simulator.time(begins).start_us + (rng.random_range(STALL_S) * 1e6) as i64;
-    let Some(waiting) = index.checked_sub(begins) else {
-        return 0;
-    };
-    let received_us = ends_us + waiting as i64 * CATCH_UP_US;
-    (received_us - simulator.time(index).start_us).max(0)
 }
 
 /// Transposes rows of `stride` bytes: `into[bin][azimuth] = rows[azimuth][first_byte + bin]`.

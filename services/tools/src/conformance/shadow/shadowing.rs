@@ -99,7 +99,6 @@ impl<'a> Shadowing<'a> {
 
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
     pub(crate) fn run(mut self) -> Result<Record, Failure> {
-        let began = Instant::now();
         let program = &self.program.candidate;
         let (command, out) = (program.command.join(" "), program.manifest.out.display());
         let stage = program.stage.name();
@@ -111,10 +110,9 @@ impl<'a> Shadowing<'a> {
             self.attend()?;
             // A program that cannot be started is reported by the error alone.
             begins.take().into_iter().for_each(say);
-            let (limit, scans) = (self.arguments.duration, self.arguments.scans);
-            let is_over = limit.is_some_and(|limit| began.elapsed() >= limit);
+            let scans = self.arguments.scans;
             let has_enough = scans.is_some_and(|scans| self.record.counts.compared >= scans);
-            if is_over || has_enough || self.is_done(has_ended) || self.sleep()? {
+            if has_enough || self.is_done(has_ended) || self.sleep()? {
                 return self.finish();
             }
         }

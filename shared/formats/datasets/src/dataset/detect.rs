@@ -225,7 +225,9 @@ fn by_image(
         return Err(OpenError::unknown_layout(folder, &reason, SET_FORMAT));
     };
     let boreas_folders = has_boreas_folders(root);
-    let mut scores = Format::ALL.map(|format| (-score(format, &image, boreas_folders), format));
+    let formats = Format::OF_IMAGES.iter().copied();
+    let scores = formats.map(|format| (-score(format, &image, boreas_folders), format));
+    let mut scores: Vec<_> = scores.collect();
     scores.sort_unstable();
     let (best, format) = scores[0];
     let equal = scores[1..].iter().filter(|(score, _)| *score == best);

@@ -60,7 +60,8 @@ impl OpenError {
     }
 
     pub(crate) fn unknown_layout(path: &Path, reason: &str, remedy: &str) -> Self {
-        let formats = Format::ALL.map(Format::name).join(", ");
+        let formats = Format::OF_IMAGES.iter().map(|format| format.name());
+        let formats = formats.collect::<Vec<_>>().join(", ");
         let known = format!("{formats}, and as MCAP recordings of runs and bags of ROS 2");
         let fault = format!("is not a known dataset: {reason}; known are {known}: {remedy}");
         Self::at(path, fault)

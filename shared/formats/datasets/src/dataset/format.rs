@@ -4,39 +4,14 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Defines [`Format`] from its rows: the meaning of a format, and its name in kebab case.
-macro_rules! formats {
-    (
-        images { $($(#[$of_images:meta])* $images:ident = $name:literal,)* }
-        others { $($(#[$of_other:meta])* $other:ident = $other_name:literal,)* }
-    ) => {
-        /// A file format; configurations name it in kebab case (`boreas-rt`).
-        #[derive(
-            Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-            schemars::JsonSchema,
-        )]
-        #[serde(rename_all = "kebab-case")]
-        pub enum Format {
-            $($(#[$of_images])* $images,)*
-            $($(#[$of_other])* $other,)*
-        }
-
-        impl Format {
-            /// All formats of folders of images, in the order of preference if several fit equally.
-            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$images),*];
-
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$images => $name,)*
-                    $(Self::$other => $other_name,)*
-                }
-            }
-        }
-    };
-}
-
-formats! {
-    images {
+gyre_geometry::named! {
+    /// A file format; configurations name it in kebab case (`boreas-rt`).
+    #[derive(
+        Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+        schemars::JsonSchema,
+    )]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Format {
         /// Oxford Radar RobotCar.
         Oxford = "oxford",
         /// Oxford Offroad Radar Dataset.
@@ -53,8 +28,6 @@ formats! {
         Radiate = "radiate",
         /// FoMo.
         Fomo = "fomo",
-    }
-    others {
         /// A recording of a run as MCAP, of `gyre record`.
         Mcap = "mcap",
         /// A format that Gyre has no reader for: of a program with a [`Dataset`](super::Dataset) of
@@ -67,10 +40,8 @@ formats! {
 }
 
 impl Format {
-    pub fn by_name(name: &str) -> Option<Self> {
-        let mut all = Self::ALL.into_iter().chain([Self::Mcap, Self::Ros2Bag]);
-        all.find(|format| format.name() == name)
-    }
+    /// All formats of folders of images, in the order of preference if several fit equally.
+    pub const OF_IMAGES: &'static [Self] = Self::ALL.split_at(Self::Mcap as usize).0;
 }
 
 impl fmt::Display for Format {

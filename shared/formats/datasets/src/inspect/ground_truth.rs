@@ -1,8 +1,8 @@
-//! The ground truth files of a dataset: their coverage and clocks.
+//! The ground truth files of a dataset, and the scans that they cover.
 
 use std::path::{Path, PathBuf};
 
-use gyre_radar::{ClockOffset, MAX_OFFSET_S, clock_offset, median, trajectory::Trajectory};
+use gyre_radar::{median, trajectory::Trajectory};
 use serde_json::{Value, json};
 
 use super::Report;
@@ -18,7 +18,7 @@ const MARGIN_NS: i64 = 20_000_000;
 /// A trajectory with a shorter path stands, m.
 const STANDING_M: f64 = 0.1;
 
-pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset, trajectory: Option<&Trajectory>) {
+pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset) {
     let entries = std::fs::read_dir(&report.root).into_iter().flatten();
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     let is_shown = |path: &Path| {
@@ -40,17 +40,12 @@ pub(super) fn examine(report: &mut Report, dataset: &dyn Dataset, trajectory: Op
     let stamps: Vec<i64> = stamps.collect();
     let mut figures = Vec::new();
     for file in &files {
-        figures.push(examine_file(report, file, &stamps, trajectory));
+        figures.push(examine_file(report, file, &stamps));
     }
     report.figure("ground_truths", figures);
 }
 
-fn examine_file(
-    report: &mut Report,
-    file: &Path,
-    scans_ns: &[i64],
-    trajectory: Option<&Trajectory>,
-) -> Value {
+fn examine_file(report: &mut Report, file: &Path, scans_ns: &[i64]) -> Value {
     let name = report.name_of(file);
     let truth = match read_trajectory(file) {
         Ok(truth) => truth,
@@ -68,7 +63,6 @@ fn examine_file(
     let (span_ns, poses, path_m) = (truth.span_ns(), truth.len(), truth.path_length_m());
     let covered = span_ns.map(within).filter(|_| !scans_ns.is_empty());
     let nearest_s = nearest_pose_s(&truth, scans_ns);
-    let clock = trajectory.and_then(|given| clock_offset(given, &truth));
     let span = span_ns.map_or("no times".to_owned(), |(a, b)| {
         format!("{:.1} s", (b - a) as f64 * 1e-9)
     });
@@ -76,12 +70,11 @@ fn examine_file(
     let nearest = nearest_s.map_or(String::new(), |s| {
         format!(", median distance of the nearest pose {:.1} ms", s * 1e3)
     });
-    let of_clock = clock.as_ref().map_or(String::new(), clock_in_words);
     report.line(
         "ground truth",
-        format!("{name}: {poses} poses, {path_m:.1} m, {span}{covers}{nearest}{of_clock}"),
+        format!("{name}: {poses} poses, {path_m:.1} m, {span}{covers}{nearest}"),
     );
-    let found = findings(file, &truth, covered, report.scans, clock.as_ref());
+    let found = findings(file, &truth, covered, report.scans);
     report.findings.extend(found);
     json!({
         "file": file,
@@ -92,16 +85,7 @@ fn examine_file(
         "span_ns": span_ns,
         "scans_covered": covered,
         "nearest_pose_s": nearest_s,
-        "clock": clock,
     })
-}
-
-fn clock_in_words(clock: &ClockOffset) -> String {
-    match clock.is_reliable() {
-        _ if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.delay_s),
-        true => format!(", clock {:+.2} s", clock.delay_s),
-        false => ", clock unknown".to_owned(),
-    }
 }
 
 fn findings(
@@ -109,7 +93,6 @@ fn findings(
     truth: &Trajectory,
     covered: Option<usize>,
     scans: usize,
-    clock: Option<&ClockOffset>,
 ) -> impl Iterator<Item = String> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let lacks = |is_so: bool, what: &str| is_so.then(|| format!("{name} {what}."));
@@ -123,28 +106,8 @@ fn findings(
         lacks(is_path && path_m < STANDING_M, stands),
         lacks(truth.span_ns().is_none(), no_times),
         partly.map(|n| format!("{name} covers {n} of {scans} scans.")),
-        clock.and_then(|clock| clock_finding(clock, &name)),
     ];
     findings.into_iter().flatten()
-}
-
-fn clock_finding(clock: &ClockOffset, name: &str) -> Option<String> {
-    if !clock.is_reliable() {
-        return Some(format!(
-            "{name} does not correlate with the given trajectory at any offset within {MAX_OFFSET_S} s: its clock cannot be compared."
-        ));
-    }
-    let mirrored = match clock.mirrored {
-        true => " and mirrored (it turns left where the trajectory turns right)",
-        false => "",
-    };
-    match clock.agrees() {
-        true if clock.mirrored => Some(format!("The clock of {name} agrees{mirrored}.")),
-        true => None,
-        false => Some(format!(
-            "{name} is {clock} relative to the given trajectory{mirrored}."
-        )),
-    }
 }
 
 fn nearest_pose_s(truth: &Trajectory, scans_ns: &[i64]) -> Option<f64> {

@@ -259,7 +259,7 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
             assert!(all(measured, flag::MEASURED | flag::ASSUMED));
             assert!(all(stale, flag::STALE | flag::ASSUMED));
         }
-        let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+        let report = inspect(root.path(), &DatasetOptions::default()).unwrap();
         let findings = report.findings.join(" ");
         let sentence = "3 of 5 scans have lost azimuths, 5 in all";
         assert!(findings.contains(sentence), "{findings}");

@@ -92,7 +92,7 @@ fn inspect_has_times_and_gaps_of_images_that_are_not_named_by_times() {
     }
     fs::copy(images.join("scan2.png"), images.join("scan2 (1).png")).unwrap();
     fs::write(images.join("scan4.png"), "damaged").unwrap();
-    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+    let report = inspect(root.path(), &DatasetOptions::default()).unwrap();
     let (findings, timing) = (report.findings.join(" "), &report.figures["timing"]);
     let unreadable = report.figures["unreadable"].as_array().unwrap();
     assert_eq!((report.scans, unreadable.len()), (6, 1));
@@ -164,7 +164,7 @@ fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
             assert!(off.abs() < 1e-6, "{format}, scan {k}");
             assert_eq!(scan.view().row(rows - 1)[5], Sweep::power(rows - 1, 5));
         }
-        let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+        let report = inspect(root.path(), &DatasetOptions::default()).unwrap();
         assert_eq!(report.figures["azimuths"], 40);
         assert_eq!(report.figures["rows"]["in_scan"][0], 38);
         let findings = report.findings.join(" ");
@@ -219,7 +219,7 @@ fn radiate_times_that_are_off_do_not_move_the_scans_and_are_named() {
         for (now, before) in stamps().iter().zip(&expected) {
             assert!((now - before).abs() < 1_000, "{off}: {now}, not {before}");
         }
-        let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+        let report = inspect(root.path(), &DatasetOptions::default()).unwrap();
         let (findings, timing) = (report.findings.join(" "), &report.figures["timing"]);
         assert!(findings.contains(sentence), "{findings}");
         assert!((timing["period_s"].as_f64().unwrap() - 0.25).abs() < 1e-6);

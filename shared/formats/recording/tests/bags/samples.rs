@@ -274,7 +274,7 @@ fn a_report_has_the_fixes_of_the_bag_or_why_they_cannot_be_used() {
             gnss_topic: topic.map(str::to_owned),
             ..InspectedLogs::default()
         };
-        inspect_dataset(&path, dataset, &DatasetOptions::default(), &logs, None)
+        inspect_dataset(&path, dataset, &DatasetOptions::default(), &logs)
     };
     let two = with_changed(&[FIX, "/gps/fix"], |number, fix| {
         fix.status.status = -i8::from(number == 0);

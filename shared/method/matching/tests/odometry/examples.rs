@@ -53,14 +53,8 @@ fn an_own_dataset_is_registered_and_inspected() {
     fs::write(damaged.unwrap().path(), "too short").unwrap();
     let dataset = Box::new(RawSweeps::open(folder.path()).unwrap());
     let options = DatasetOptions::default();
-    let report = inspect_dataset(
-        folder.path(),
-        dataset,
-        &options,
-        &InspectedLogs::default(),
-        None,
-    )
-    .to_string();
+    let logs = InspectedLogs::default();
+    let report = inspect_dataset(folder.path(), dataset, &options, &logs).to_string();
     assert!(
         report.contains("other") && report.contains("has 9 bytes"),
         "{report}"
