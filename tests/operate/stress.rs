@@ -133,7 +133,6 @@ fn the_sensors_clock_goes_on_while_its_source_is_dead() {
 #[test]
 fn a_test_that_cannot_be_carried_out_is_no_verdict() {
     let stress = Stress::new();
-    let remedy = "simulation.gyro.profile";
     for (words, said) in [
         ("nowhere --scenario steady", ["gyre stress: ", "nowhere"]),
         (
@@ -148,22 +147,10 @@ fn a_test_that_cannot_be_carried_out_is_no_verdict() {
             "--scenario steady --set run.observers=0",
             ["", "set run.observers to 1 or more"],
         ),
-        (
-            "--scenario gyro-out",
-            ["needs a gyro, and gyro.kind is none", remedy],
-        ),
-        (
-            "--scenario wheels-slip",
-            ["needs wheels, and wheels.kind is none", remedy],
-        ),
-        ("--scenario radar-blind", ["needs a gyro or wheels", remedy]),
     ] {
         stress.is_not_carried_out(words, &said);
     }
     stress.assert_nothing_left("steady");
-    let stress = Stress::of(&with_gyro_and_wheels());
-    let blind = format!("--scenario radar-blind {BOTH}");
-    stress.is_not_carried_out(&blind, &["the recording lasts 15 s"]);
 }
 
 #[test]
@@ -229,40 +216,6 @@ fn what_a_killed_run_has_left_is_not_measured() {
     assert_eq!(next["verdict"], "not-judged");
     assert_eq!(next["figures"]["counts"]["due"], 24);
     stress.assert_nothing_left("steady");
-}
-
-/// A drive of 15 s with the logs of a gyro and of wheels.
-fn with_gyro_and_wheels() -> PathBuf {
-    let settings = "scans = 60\nsensor.profile = 'cts350x-radiate'\ndrive.speed_mps = 8.0\n\
-        gyro.profile = 'asm330lhh'\nwheels.rate_hz = 50.0\n";
-    recording::configured("stressed-gyro-and-wheels", settings)
-}
-
-const BOTH: &str = "--set gyro.kind=auto --set wheels.kind=auto";
-
-#[test]
-#[ignore = ".ci/nightly: 25 s, two runs at the pace of a radar"]
-fn a_gyro_that_drops_out_is_noticed_and_a_recovery_that_takes_too_long_fails() {
-    let stress = Stress::of(&with_gyro_and_wheels());
-    let budgets = "--set budget.gyro-out.degraded_percent=0 \
-        --set budget.gyro-out.recovery_ms=5000 --set budget.wheels-slip.recovery_ms=1";
-    let scenarios = "--scenario gyro-out --scenario wheels-slip";
-    let words = format!("--quick {BOTH} {scenarios} {budgets}");
-    let said = failed(stress.run(&words));
-    let outcomes = stress.outcomes();
-    let [out, slip] = [0, 1].map(|index| &outcomes[index]);
-    assert_eq!(out["verdict"], "passed", "{out}");
-    let fault = &out["figures"]["witness_faults"][0];
-    assert_eq!(fault["kind"], "gyro-out");
-    assert_eq!(fault["noticed"], fault["motions"], "{fault}");
-    assert!(number(&fault["recovery_ms"]) > 1.0, "{fault}");
-    assert_eq!(out["checks"][0]["key"], "degraded_percent");
-    // The slip is noticed, and it is its end that takes too long.
-    assert_eq!(slip["verdict"], "failed", "{slip}");
-    assert_eq!(slip["problem"], Value::Null);
-    assert!(slip["figures"]["witness_faults"][0]["noticed"].as_u64() > Some(0));
-    assert!(said.contains("wheels-slip: FAILED; recovery_ms"), "{said}");
-    stress.assert_nothing_left("gyro-out");
 }
 
 /// The helper is asked for so little that other programs do not notice.

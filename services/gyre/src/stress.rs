@@ -6,15 +6,12 @@ use gyre_configuration::{
     Configuration,
     terminal::{Failure, own, print},
 };
-use gyre_contract::{StageId, Witness, run::Scenario};
-use gyre_matching::RefinementKind;
+use gyre_contract::{StageId, run::Scenario};
 use gyre_results::{
     Content, Out,
     machine::{Machine, today},
 };
-use gyre_tools::stress::{
-    Others, Provenance, Report, StressArguments, TestedPipeline, report::Verdict,
-};
+use gyre_tools::stress::{Provenance, Report, StressArguments, TestedPipeline, report::Verdict};
 
 use crate::{
     arguments::{RunArguments, resolve},
@@ -62,16 +59,10 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     fs::write(out.join("config.toml"), configuration.to_toml()?)?;
     let stages = StageId::ALL.into_iter();
     let turn = configuration.source.played(played.dataset.scans());
-    let odometry = &configuration.odometry;
     let tested = TestedPipeline {
         out: out.path().to_owned(),
         period,
-        first_ns: played.dataset.nominal_stamp_ns(turn.start),
         turn,
-        others: Others {
-            used: Witness::ALL.map(|kind| odometry.sensors.is_used(kind)),
-            are_weighed: odometry.refinement.kind != RefinementKind::None,
-        },
         stages: stages.filter(|stage| configuration.has(*stage)).collect(),
         budget: configuration.budget.clone(),
         shared_bytes: checked.footprint.total() as u64,

@@ -3,13 +3,11 @@
 //!
 //! [`run`] opens a recording; [`play`] plays any dataset.
 
-mod faults;
 mod listing;
 mod player;
 
 use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path};
 
-use faults::Faults;
 use gyre_contract::{
     ScanHeader, StageId,
     run::{PlayedFrom, SourceConfig, StageCounters},
@@ -81,21 +79,12 @@ pub fn play(
 ) -> Result<StageCounters, RunError> {
     let config: SourceConfig = launch.section("source")?;
     let once = config.played(dataset.scans());
-    let first_ns = dataset.nominal_stamp_ns(once.start);
-    let faults = Faults::of(config.faults.clone(), first_ns)?;
-    if !config.faults.is_empty() {
-        tracing::warn!(
-            faults = config.faults.len(),
-            "faults are put into what is played: source.faults"
-        );
-    }
     let mut replay = Replay {
         scans: config.stream(dataset.scans()),
         turns: Turns::of(once, dataset.as_ref()),
         burst: config.burst,
         dataset,
-        samples: faults.put_into(samples)?,
-        faults,
+        samples,
         pace,
     };
     let counters = source::run(launch, &mut replay, &config)?;
@@ -111,7 +100,6 @@ struct Replay {
     samples: ScanSamples,
     scans: Range<usize>,
     turns: Turns,
-    faults: Faults,
     burst: NonZeroUsize,
     pace: Pace,
 }
@@ -153,7 +141,6 @@ impl Source for Replay {
             true => Unreadable::Io(error.to_string()),
             false => Unreadable::Damaged(error.to_string()),
         })?);
-        self.faults.blind(header, bytes);
         let samples = self.samples.of(self.dataset.as_ref(), header.span_ns());
         header.set_samples(bytes, &samples, 0);
         header.shift_times(shift_ns, bytes);

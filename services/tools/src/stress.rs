@@ -12,13 +12,12 @@ pub mod processes;
 pub mod record;
 pub mod report;
 mod search;
-pub mod witness_fault;
 
 use std::{ops::Range, path::PathBuf, time::Duration};
 
 use clap::Args;
 use gyre_configuration::terminal::inputs::Inputs;
-use gyre_contract::{StageId, Witness, run::Budget};
+use gyre_contract::{StageId, run::Budget};
 
 pub use campaign::stress;
 pub use gyre_contract::run::Scenario;
@@ -81,9 +80,6 @@ pub struct TestedPipeline {
     pub period: Duration,
     /// The scans of a turn of the recording, by their index in it.
     pub turn: Range<usize>,
-    /// The stamp of the first of them, ns since 1970, if it is known before they are read.
-    pub first_ns: Option<i64>,
-    pub others: Others,
     pub stages: Vec<StageId>,
     pub budget: Budget,
     pub shared_bytes: u64,
@@ -98,13 +94,4 @@ impl TestedPipeline {
     pub fn run_out(&self, name: &str) -> PathBuf {
         self.out.join("runs").join(name)
     }
-}
-
-/// The sensors beside the radar that the run uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Others {
-    /// The kinds that are used, in the order of [`Witness::ALL`].
-    pub used: [bool; Witness::ALL.len()],
-    /// True if they are weighed against the radar: there is a refinement.
-    pub are_weighed: bool,
 }

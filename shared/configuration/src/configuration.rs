@@ -329,7 +329,7 @@ impl Configuration {
                 (
                     "source",
                     &[
-                        "kind", "address", "data", "from", "first", "scans", "repeat", "faults",
+                        "kind", "address", "data", "from", "first", "scans", "repeat",
                     ],
                 ),
                 ("link", &["side", "cut", "keyframes"]),

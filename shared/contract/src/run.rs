@@ -21,7 +21,7 @@ pub use record::RecordConfig;
 pub use report::{Ending, Report, StageCounters, Swapped};
 pub use scenario::{Judged, RADAR_HZ, Scenario};
 pub use scheduling::Scheduling;
-pub use source::{PlayedFault, PlayedFaultKind, PlayedFrom, SourceConfig, SourceKind};
+pub use source::{PlayedFrom, SourceConfig, SourceKind};
 
 /// The file in the folder of the results with the configuration of the run's begin, TOML.
 pub const BEGUN_WITH: &str = "journal/run.toml";

@@ -1,6 +1,6 @@
 //! One scenario after the other.
 
-use std::{sync::Arc, thread, time::Duration};
+use std::{sync::Arc, thread};
 
 use gyre_client::run::{free_shared_memory, sweep};
 use gyre_configuration::terminal::{Failure, print};
@@ -16,7 +16,6 @@ use crate::stress::{
     pipeline::{Measured, Setup, measure},
     report::{Check, Figures, ScenarioOutcome, Step, Verdict},
     search::{Found, Steps, largest, step_duration},
-    witness_fault::{self, WitnessFault},
 };
 
 const BURST: u64 = 3;
@@ -49,7 +48,7 @@ pub fn stress(
         return Err(format!("this run has no stage {}", stage.name()).into());
     }
     let scenarios = match arguments.scenarios.is_empty() {
-        true => possible(tested),
+        true => Vec::from(Scenario::ALL),
         false => arguments.scenarios.clone(),
     };
     let (mut outcomes, mut printed) = (Vec::new(), Ok(()));
@@ -81,20 +80,6 @@ pub fn stress(
     Ok(report)
 }
 
-/// Returns all scenarios except faults of gyro and wheels that are absent from the run or its
-/// recording.
-fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
-    let mut all = Vec::from(Scenario::ALL);
-    all.retain(|scenario| match witness_fault::lacks(tested, *scenario) {
-        None => true,
-        Some(lacking) => {
-            print::note(format_args!("{scenario}: left out: {lacking}"));
-            false
-        }
-    });
-    all
-}
-
 struct Campaign<'a> {
     tested: &'a TestedPipeline,
     arguments: &'a StressArguments,
@@ -116,10 +101,7 @@ impl Campaign<'_> {
     }
 
     fn single(&self) -> Result<ScenarioOutcome, Failure> {
-        if let Some(lacking) = witness_fault::lacks(self.tested, self.scenario) {
-            return Err(lacking.into());
-        }
-        let setup = self.setup()?;
+        let setup = self.setup();
         if setup.faults.is_some() && setup.duration < fault::LEAST {
             let (scenario, least_s) = (self.scenario, fault::LEAST.as_secs());
             return Err(format!("{scenario} needs --duration {least_s} or more: time for a fault, and for the recovery from it").into());
@@ -130,14 +112,13 @@ impl Campaign<'_> {
             checks: checks(&self.limits, &measured.figures),
             problem,
             figures: Some(measured.figures),
-            duration_s: setup.duration.as_secs_f64(),
             ..self.empty()
         }
         .judged()
         .unless(omitted))
     }
 
-    fn setup(&self) -> Result<Setup, Failure> {
+    fn setup(&self) -> Setup {
         let (scenario, arguments) = (self.scenario, self.arguments);
         let mut setup = Setup::undisturbed(scenario, scenario.rate_hz(), arguments.duration);
         let faults = |kind| {
@@ -166,23 +147,9 @@ impl Campaign<'_> {
             Scenario::SlowStage => setup.set.extend(self.slow_stages()),
             Scenario::Stopped => setup.faults = faults(FaultKind::Stop),
             Scenario::Kills => setup.faults = faults(FaultKind::Kill),
-            _ => self.play_faults(&mut setup)?,
+            _ => {}
         }
-        Ok(setup)
-    }
-
-    /// Adds the faults that the source plays, and the time that they take.
-    fn play_faults(&self, setup: &mut Setup) -> Result<(), Failure> {
-        setup.played = witness_fault::faults(self.scenario);
-        if setup.played.is_empty() {
-            return Ok(());
-        }
-        let needed_s = witness_fault::needed_s(&setup.played);
-        let needed_s = needed_s / self.tested.relative_rate(setup.rate_hz);
-        setup.duration = setup.duration.max(Duration::from_secs_f64(needed_s));
-        let faults = toml::Value::try_from(&setup.played)?;
-        setup.set.push(format!("source.faults={faults}"));
-        Ok(())
+        setup
     }
 
     fn slow_stages(&self) -> impl Iterator<Item = String> {
@@ -304,17 +271,8 @@ fn problem(measured: &Measured) -> Option<String> {
         ));
     }
     let mut lost = figures.faults.iter().filter(|it| it.recovery_ms.is_none());
-    if let Some(fault) = lost.next() {
-        return Some(format!("no pose has followed the fault of {}", fault.stage));
-    }
-    // A fault that could not be observed is no result about the pipeline.
-    match measured.omitted {
-        None => figures
-            .witness_faults
-            .iter()
-            .find_map(WitnessFault::problem),
-        Some(_) => None,
-    }
+    let fault = lost.next()?;
+    Some(format!("no pose has followed the fault of {}", fault.stage))
 }
 
 fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
@@ -334,7 +292,7 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
         (true, "cpu_percent", cpu, limits.cpu_percent),
         (true, "memory_mb", memory, limits.memory_mb),
         (has_motions, "degraded_percent", degraded, limits.degraded_percent),
-        (figures.had_faults(), "recovery_ms", recovery, limits.recovery_ms),
+        (!figures.faults.is_empty(), "recovery_ms", recovery, limits.recovery_ms),
     ];
     let judged = all.into_iter().filter(|it| it.0);
     judged

@@ -11,10 +11,7 @@ use std::{
 
 use gyre_client::{Next, Observer, RunError, clock};
 use gyre_configuration::terminal::Failure;
-use gyre_contract::{
-    Footprint, Pose, PoseHeader, StageId,
-    run::{PlayedFault, Scenario},
-};
+use gyre_contract::{Footprint, Pose, PoseHeader, StageId, run::Scenario};
 use running::Running;
 
 use crate::stress::{
@@ -24,7 +21,6 @@ use crate::stress::{
     processes::Sampler,
     record::Recorder,
     report::Figures,
-    witness_fault::{PlayedClock, WitnessFaults},
 };
 
 /// The time after the measurement during which late poses still count.
@@ -46,7 +42,6 @@ pub struct Setup {
     /// Helpers that load the machine while it is measured.
     pub loads: Vec<Work>,
     pub faults: Option<(FaultKind, Vec<StageId>)>,
-    pub played: Vec<PlayedFault>,
 }
 
 impl Setup {
@@ -60,7 +55,6 @@ impl Setup {
             burst: 1,
             loads: Vec::new(),
             faults: None,
-            played: Vec::new(),
         }
     }
 }
@@ -100,8 +94,6 @@ pub fn measure(
     let latency = session.recorder.finish(session.period_ns, clock::now_ns());
     let faults = session.faults.map(Faults::finish);
     let (faults, omitted) = faults.unwrap_or_default();
-    let played = session.witness.map(WitnessFaults::finish);
-    let (witness_faults, unplayed) = played.unwrap_or_default();
     let manifest = observed.manifest();
     let shared_bytes = Footprint::new(&manifest.window, &manifest.limits).total() as u64;
     drop(poses);
@@ -112,11 +104,10 @@ pub fn measure(
     let ended_load =
         ended_load.map(|ended| format!("the load was not there all the time: {ended}"));
     Ok(Measured {
-        omitted: omitted.or(unplayed).or(ended_load),
+        omitted: omitted.or(ended_load),
         figures: Figures {
             latency,
             faults,
-            witness_faults,
             motions,
             processes,
             shared_bytes,
@@ -162,7 +153,6 @@ struct Session {
     recorder: Recorder,
     processes: Sampler,
     faults: Option<Faults>,
-    witness: Option<WitnessFaults>,
     period_ns: i64,
     ends_ns: i64,
     sampled: Instant,
@@ -178,22 +168,12 @@ impl Session {
         let began_ns = clock::now_ns();
         let ends_ns = began_ns + setup.duration.as_nanos() as i64;
         let (faults, turn_end) = (setup.faults.clone(), tested.turn.end as u64);
-        let clock = tested.first_ns.map(|first_ns| PlayedClock {
-            first_ns,
-            period_ns: tested.period.as_nanos() as i64,
-            rate: tested.relative_rate(setup.rate_hz),
-            end: turn_end,
-        });
-        let clock = clock.filter(|_| !setup.played.is_empty());
-        let witness =
-            |clock| WitnessFaults::new(setup.played.clone(), tested.others, clock, began_ns);
         let mut recorder = Recorder::new(began_ns..ends_ns, setup.burst, turn_end);
         recorder.add(newest);
         Self {
             recorder,
             processes: Sampler::new(supervisor, out),
             faults: faults.map(|faults| Faults::new(faults, began_ns, setup.duration)),
-            witness: clock.map(witness),
             period_ns: (1e9 / setup.rate_hz) as i64,
             ends_ns,
             sampled: Instant::now(),
@@ -222,9 +202,6 @@ impl Session {
         if let Some(faults) = &mut self.faults {
             faults.pose(pose);
         }
-        if let Some(faults) = &mut self.witness {
-            faults.pose(pose);
-        }
     }
 
     fn poll(&mut self) {
@@ -244,8 +221,7 @@ impl Session {
             return false;
         }
         let faults = self.faults.as_ref().is_some_and(Faults::are_open);
-        let witness = self.witness.as_ref().is_some_and(WitnessFaults::are_open);
-        let is_owed = self.recorder.owes(self.period_ns) || faults || witness;
+        let is_owed = self.recorder.owes(self.period_ns) || faults;
         !is_owed || now_ns > self.ends_ns + GRACE.as_nanos() as i64
     }
 }

@@ -15,12 +15,11 @@ use crate::stress::{
     fault::Fault,
     processes::Cost,
     record::{Counts, RunLatency},
-    witness_fault::WitnessFault,
 };
 
 /// The version of `report.json`. A key that changes its meaning or goes raises it; one that is
 /// added does not.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Provenance {
@@ -161,9 +160,9 @@ impl ScenarioOutcome {
 
     #[must_use]
     pub fn judged(mut self) -> Self {
-        let had_faults = self.figures.as_ref().is_some_and(Figures::had_faults);
-        let by_recovery = [Judged::ByRecovery, Judged::ButDegraded];
-        let has_recovered = by_recovery.contains(&self.scenario.judged()) && had_faults;
+        let figures = self.figures.as_ref();
+        let had_faults = figures.is_some_and(|figures| !figures.faults.is_empty());
+        let has_recovered = self.scenario.judged() == Judged::ByRecovery && had_faults;
         self.verdict = match (&self.problem, self.checks.as_slice()) {
             (Some(_), _) => Verdict::Failed,
             (None, checks) if checks.iter().any(|check| !check.passed) => Verdict::Failed,
@@ -207,9 +206,6 @@ pub struct Figures {
     #[serde(flatten)]
     pub latency: RunLatency,
     pub faults: Vec<Fault>,
-    /// Faults of gyro, wheels and radar, and recoveries.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub witness_faults: Vec<WitnessFault>,
     /// The basis of the motions of the first turn of the recording.
     pub motions: WitnessCounts,
     pub processes: Vec<Cost>,
@@ -223,15 +219,9 @@ impl Figures {
         (due > 0).then(|| 100.0 * dropped as f64 / due as f64)
     }
 
-    pub fn had_faults(&self) -> bool {
-        !self.faults.is_empty() || !self.witness_faults.is_empty()
-    }
-
     /// Returns the longest recovery from a fault, ms; `None` if a fault had no recovery.
     pub fn longest_recovery_ms(&self) -> Option<f64> {
-        let of_stages = self.faults.iter().map(|fault| fault.recovery_ms);
-        let of_others = self.witness_faults.iter().map(|fault| fault.recovery_ms);
-        let all: Option<Vec<f64>> = of_stages.chain(of_others).collect();
+        let all: Option<Vec<f64>> = self.faults.iter().map(|fault| fault.recovery_ms).collect();
         all?.into_iter().reduce(f64::max)
     }
 
@@ -248,7 +238,7 @@ impl Figures {
         let Counts { due, dropped, .. } = self.latency.counts;
         let (p50, max) = (ms(latency.p50_ms), ms(latency.max_ms));
         let p99 = ms(latency.p99_ms) + &latency.p99_mark();
-        let faults = match self.faults.len() + self.witness_faults.len() {
+        let faults = match self.faults.len() {
             0 => String::new(),
             1 => "; 1 fault".to_owned(),
             faults => format!("; {faults} faults"),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use gyre_colossus::Address;
 use gyre_contract::{
     StageId,
-    run::{Mode, PlayedFault, PlayedFrom, Rate, Side, SourceKind, StageConfig},
+    run::{Mode, PlayedFrom, Rate, Side, SourceKind, StageConfig},
 };
 use gyre_geometry::samples::{SensorConfig, SensorKind};
 use gyre_ros2_messages::Domain;
@@ -62,10 +62,6 @@ impl Configuration {
         if self.record.keeps_whole() {
             let reason = "keep_mb and keep_s remove whole files: set split_mb or split_s too";
             return Err(value("record", reason.to_owned()));
-        }
-        if let Some((key, time_s)) = source.faults.iter().find_map(PlayedFault::invalid) {
-            let reason = format!("faults has {key} = {time_s}, but must have 0 or more");
-            return Err(value("source", reason));
         }
         let of_all = ("budget".to_owned(), &self.budget.all);
         let scenarios = self.budget.scenarios.iter();
@@ -170,7 +166,6 @@ impl Configuration {
         let (is_radar, is_live, kind) =
             (self.is_radar(), run.mode == Mode::Live, source.kind.name());
         let has_scans = !is_radar && !self.is_side(Side::Base);
-        let plays_scans = has_scans && source.from == PlayedFrom::Scan;
         refuse! {
             "source" if is_radar && !is_live =>
                 "kind `{kind}` is a radar, which does not wait: set run.mode to `live`";
@@ -184,8 +179,6 @@ impl Configuration {
                 "address is missing: give the radar's, as in `192.168.0.1`";
             "source" if source.burst.get() > 1 && run.rate == Rate::Max =>
                 "burst needs a pace: set run.rate to `realtime` or a factor";
-            "source" if !source.faults.is_empty() && !plays_scans =>
-                "faults are put into the scans of a recording or a simulation, which this run does not play: remove them";
             "source" if source.commands.is_some() && source.from != PlayedFrom::Scan =>
                 "commands need masking, whose place `from` takes: remove one of them";
             "run" if !(0.0..=200.0).contains(&run.predict_hz) =>

@@ -50,8 +50,7 @@ limits! {
     /// Scans that were due and have no pose, % of those that were due.
     drops_percent,
     /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has
-    /// worked on since, ms. Of a fault of gyro, wheels or radar: from its end to the first pose of
-    /// a motion that is as before it.
+    /// worked on since, ms.
     recovery_ms,
     /// Motions that the radar does not wholly determine (`along walls`, `way guessed`, `dead
     /// reckoning`, `guessed`), % of the motions before the recording repeats.
@@ -86,10 +85,6 @@ impl Budget {
             Judged::ByBudget | Judged::ByItself => own.or(&self.all),
             Judged::ButDrops => own.or(&Limits {
                 drops_percent: None,
-                ..self.all.clone()
-            }),
-            Judged::ButDegraded => own.or(&Limits {
-                degraded_percent: None,
                 ..self.all.clone()
             }),
             Judged::ByRecovery => own.or(&Limits {
@@ -130,7 +125,6 @@ mod tests {
             (Scenario::Stopped, None, None, None),
             (Scenario::Fast, Some(100.0), Some(5.0), Some(1.0)),
             (Scenario::Bursts, Some(100.0), None, Some(1.0)),
-            (Scenario::RadarBlind, Some(100.0), Some(0.0), None),
         ] {
             let expected = Limits {
                 p99_ms,

@@ -16,9 +16,6 @@ pub enum Judged {
     ByBudget,
     /// By all of `[budget]` but drops, which the scenario causes on purpose.
     ButDrops,
-    /// By all of `[budget]` except degraded motions, which it causes on purpose, by its recovery,
-    /// and by `[budget.NAME]`.
-    ButDegraded,
     /// Only by its recovery and by `[budget.NAME]`, since its purpose is a fault.
     ByRecovery,
     /// By a figure of its own: the highest rate, the number of radars.
@@ -80,14 +77,6 @@ scenarios! {
         "stages that are stopped for a second (SIGSTOP) and continued, at 4 scans/s";
     Kills: "kills", ByRecovery,
         "stages that are killed (SIGKILL), at 4 scans/s";
-    GyroOut: "gyro-out", ButDegraded,
-        "a gyro without samples for 3 s, at 4 scans/s";
-    WheelsSlip: "wheels-slip", ButDegraded,
-        "wheels that turn 30 % too fast for 3 s, at 4 scans/s";
-    ClockJump: "clock-jump", ButDegraded,
-        "a clock of gyro and wheels that is 1 s ahead for 3 s, at 4 scans/s";
-    RadarBlind: "radar-blind", ButDegraded,
-        "a radar that sees nothing for 2, 5 and 10 s, at 4 scans/s";
     Ramp: "ramp", ByItself,
         "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s";
     Fleet: "fleet", ByItself,

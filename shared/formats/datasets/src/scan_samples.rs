@@ -104,21 +104,6 @@ impl ScanSamples {
         }
     }
 
-    /// Returns the same with each sample of a log as `change` returns it, or without it. Of samples
-    /// that have the same place in the order the first one stays.
-    #[must_use]
-    pub fn changed(self, change: impl FnMut(&Sample) -> Option<Sample>) -> Self {
-        match self {
-            Self::Log { samples, faults } => {
-                let mut samples: Vec<Sample> = samples.iter().filter_map(change).collect();
-                samples.sort_by_key(Sample::order);
-                samples.dedup_by_key(|sample| sample.order());
-                Self::Log { samples, faults }
-            }
-            other => other,
-        }
-    }
-
     /// Returns a sentence for each kind of fault in the logs, as of samples that are left out.
     pub fn faults(&self) -> &[String] {
         match self {
@@ -243,24 +228,6 @@ mod tests {
         let sample = config.on_radar(&sample, None);
         assert_eq!(sample.stamp_ns, 3_420_000_000);
         assert_eq!(sample.values, [0.1, -0.2, 0.3 * 1.01, 1.0, -2.0, 9.8]);
-    }
-
-    #[test]
-    fn changed_samples_are_in_order_and_no_two_have_one_stamp() {
-        let late = |sample: &Sample| Sample {
-            stamp_ns: sample.stamp_ns + if sample.stamp_ns < 3 { 2 } else { 0 },
-            ..*sample
-        };
-        let kept = |sample: &Sample| (sample.stamp_ns != 5).then(|| late(sample));
-        let log = ScanSamples::Log {
-            samples: of(vec![1, 2, 3, 4, 5, 6]),
-            faults: Vec::new(),
-        };
-        let ScanSamples::Log { samples, .. } = log.changed(kept) else {
-            panic!("no log");
-        };
-        let stamps: Vec<i64> = samples.iter().map(|it| it.stamp_ns).collect();
-        assert_eq!(stamps, [3, 4, 6]);
     }
 
     #[test]
