@@ -157,11 +157,9 @@ impl Recorded {
         let played = configuration.source.played(dataset.scans());
         let (all, count) = (played.len(), played.len().min(arguments.scans));
         if count < all {
-            let sentence = format!(
-                "only the first {count} of {all} scans are used: --scans {all} takes them all"
-            );
+            let sentence = format!("only the first {count} of {all} scans are used");
             if arguments.distance_m.is_some() {
-                return Err(format!("{sentence}, which --distance-m needs").into());
+                return Err(format!("{sentence}, and --distance-m is the length of the whole drive: use all, --scans {all}").into());
             }
             print::note(sentence);
         }

@@ -1,7 +1,9 @@
 //! The method on one page.
 
 use crate::{
-    CalibrationError, Drive, Estimate, Fact, FactVector, Track, facts::FACTS, parts::Pairs,
+    CalibrationError, Drive, Estimate, Fact, Track,
+    facts::{FACTS, FactVector},
+    parts::Pairs,
 };
 
 const ROUNDS: usize = 4;
@@ -29,7 +31,7 @@ pub fn calibrate(drive: &Drive, progress: &dyn Fn()) -> Result<Calibration, Cali
     if path_m < MIN_PATH_M {
         let scans = drive.sweeps.len();
         return Err(CalibrationError::Unusable(format!(
-            "{scans} scans over {path_m:.0} m are too few: the constants show over {MIN_PATH_M} m and more, so give a longer recording or a larger --scans"
+            "{scans} scans over {path_m:.0} m are too few: the constants show over {MIN_PATH_M} m and more"
         )));
     }
     let pairs = Pairs::of(drive, &track, progress);

@@ -13,8 +13,8 @@ use gyre_matching::{
 use gyre_radar::PointExtractor;
 
 use crate::{
-    FactVector, OwnReflections,
-    facts::{Sign, correct},
+    OwnReflections,
+    facts::{FactVector, Sign, correct},
 };
 
 /// Doppler coefficient of recordings that have none, s: small enough to change nothing, and it

@@ -1,13 +1,11 @@
 //! The facts about a radar that a drive can determine, and their effects on its points.
 
 use gyre_geometry::SparsePoint;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 pub const FACTS: usize = 3;
 
 pub type FactVector = SVector<f64, FACTS>;
-
-pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fact {

@@ -9,8 +9,8 @@ use std::fmt::{self, Write};
 use gyre_geometry::SweepGeometry;
 
 use crate::{
-    Calibration, CalibrationError, Drive, Estimate, FACTS, Fact, FactVector, OwnReflections,
-    calibrate,
+    Calibration, CalibrationError, Drive, Estimate, FACTS, Fact, OwnReflections, calibrate,
+    facts::FactVector,
 };
 
 /// The given length of the path over that by the scans: beyond, it is of another drive, or scans
@@ -77,8 +77,8 @@ pub struct Found {
     has_settled: bool,
     constants: Vec<Constant>,
     /// The size of the differences between the parts of the scans as configured, and with the
-    /// constants that contradict it.
-    differences: [f64; 2],
+    /// constants that contradict it, if there are any.
+    differences: Option<[f64; 2]>,
     /// The range resolution, if the length of the path is given.
     resolution: Option<Constant>,
     /// Sentences about the range resolution and the vehicle's own reflections.
@@ -111,18 +111,16 @@ impl Study {
         };
         let mut found = Found {
             scans: drive.sweeps.len(),
-            path_m: 0.0,
+            path_m: calibration.track.path_m().last().copied().unwrap_or(0.0),
             pairs: calibration.pairs,
             has_settled: calibration.has_settled,
             constants: Fact::ALL.map(constant).to_vec(),
-            differences: [1.0; 2],
+            differences: None,
             resolution: None,
             notes: Vec::new(),
         };
-        found.compare(calibration.differences(&drive, &found.change(), progress)?);
-        let track = drive.mean_track_with(&found.change())?;
-        found.path_m = track.path_m().last().copied().unwrap_or_default();
-        found.resolve(configured)?;
+        found.compare(|change| calibration.differences(&drive, change, progress))?;
+        found.resolve(configured, &drive)?;
         let own = reflections(&drive.reflections, configured.min_range_m);
         found.notes.push(("own reflections", own));
         Ok(Self {
@@ -137,9 +135,9 @@ impl Study {
         let drives = || studies.iter().map(|study| &study.found);
         let has_settled = drives().all(|it| it.has_settled);
         let constant = |fact: Fact| {
-            let mut all = drives().map(|it| &it.constants[fact as usize]);
-            let first = all.next().map_or(Estimate::UNKNOWN, |it| it.found);
-            let found = all.fold(first, |mean, next| mean.combined(&next.found));
+            let all = drives().map(|it| it.constants[fact as usize].found);
+            let found = all.reduce(|mean, next| mean.combined(&next));
+            let found = found.unwrap_or(Estimate::UNKNOWN);
             let configured = studies[0].found.constants[fact as usize].configured;
             Constant::new(fact, configured, found, has_settled)
         };
@@ -149,19 +147,18 @@ impl Study {
             pairs: drives().map(|it| it.pairs).sum(),
             has_settled,
             constants: Fact::ALL.map(constant).to_vec(),
-            differences: [1.0; 2],
+            differences: None,
             resolution: None,
             notes: Vec::new(),
         };
-        let (change, mut differences) = (found.change(), [0.0; 2]);
-        for study in studies {
-            let share = study.found.pairs as f64 / found.pairs as f64;
-            let of_drive = study
-                .calibration
-                .differences(&study.drive, &change, &|| ())?;
-            differences = [0, 1].map(|k| differences[k] + share * of_drive[k]);
-        }
-        found.compare(differences);
+        let pairs = found.pairs as f64;
+        found.compare(|change| {
+            studies.iter().try_fold([0.0; 2], |sum, study| {
+                let (of_drive, share) = (&study.calibration, study.found.pairs as f64 / pairs);
+                let differences = of_drive.differences(&study.drive, change, &|| ())?;
+                Ok([0, 1].map(|k| sum[k] + share * differences[k]))
+            })
+        })?;
         Ok(found)
     }
 }
@@ -185,36 +182,48 @@ impl Constant {
 impl Found {
     /// The change of the constants that contradict the configured ones.
     fn change(&self) -> FactVector {
-        FactVector::from_fn(|k, _| match &self.constants[k] {
-            it if it.verdict == Verdict::Contradicts => it.found.value - it.configured,
+        FactVector::from_fn(|k, _| match self.constants.get(k) {
+            Some(it) if it.verdict == Verdict::Contradicts => it.found.value - it.configured,
             _ => 0.0,
         })
     }
 
-    /// Takes how much the parts of the scans differ as configured and as found: constants with
-    /// which they differ more are not written.
-    fn compare(&mut self, differences: [f64; 2]) {
-        self.differences = differences;
-        if differences[1] > differences[0] {
+    /// Measures how much the parts of the scans differ as configured, and with a change of the
+    /// facts: constants with which they differ more are not written.
+    fn compare(
+        &mut self,
+        differences: impl FnOnce(&FactVector) -> Result<[f64; 2], CalibrationError>,
+    ) -> Result<(), CalibrationError> {
+        let change = self.change();
+        if change == FactVector::zeros() {
+            return Ok(());
+        }
+        let [before, after] = differences(&change)?;
+        self.differences = Some([before, after]);
+        if after > before {
             let found = self.constants.iter_mut();
             found
                 .filter(|it| it.verdict == Verdict::Contradicts)
                 .for_each(|it| it.verdict = Verdict::Worse);
         }
+        Ok(())
     }
 
     /// Takes the range resolution from the length of the path.
-    fn resolve(&mut self, configured: &Configured) -> Result<(), CalibrationError> {
+    fn resolve(&mut self, configured: &Configured, drive: &Drive) -> Result<(), CalibrationError> {
         let resolution_m = f64::from(configured.geometry.range_resolution_m);
-        let path_m = self.path_m;
         let Some(distance_m) = configured.distance_m else {
             let note = format!(
                 "{resolution_m:.5} m as configured: a drive alone cannot determine it, since a larger world driven through faster looks the same; \
-                 the path is {path_m:.1} m: give its length by an odometer or GNSS with --distance-m"
+                 the path is {:.1} m: give its length by an odometer or GNSS with --distance-m",
+                self.path_m
             );
             self.notes.push((RESOLUTION.1, note));
             return Ok(());
         };
+        let track = drive.mean_track_with(&self.change())?;
+        let path_m = track.path_m().last().copied().unwrap_or_default();
+        self.path_m = path_m;
         let ratio = distance_m / path_m;
         if !PLAUSIBLE_RATIO.contains(&ratio) {
             return Err(CalibrationError::Unusable(format!(
@@ -331,11 +340,12 @@ impl fmt::Display for Found {
         for (name, note) in &self.notes {
             write!(f, "\n{name:<21} {note}")?;
         }
-        let [before, after] = self.differences;
-        write!(
-            f,
-            "\n{:<21} differ by {before:.3} as configured, by {after:.3} with what contradicts it",
-            "parts of the scans"
-        )
+        self.differences.map_or(Ok(()), |[before, after]| {
+            write!(
+                f,
+                "\n{:<21} differ by {before:.3} as configured, by {after:.3} with what contradicts it (mean squares over the usual one)",
+                "parts of the scans"
+            )
+        })
     }
 }

@@ -17,7 +17,7 @@ mod sensor;
 pub use calibrate::{Calibration, calibrate};
 pub use drive::{Drive, Sweep, Track};
 pub use error::CalibrationError;
-pub use facts::{FACTS, Fact, FactMatrix, FactVector};
+pub use facts::{FACTS, Fact};
 pub use findings::{Configured, Found, Study};
 use own_reflections::OwnReflections;
 pub use sensor::{

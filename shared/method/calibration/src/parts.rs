@@ -11,7 +11,9 @@ use gyre_radar::median;
 use nalgebra::{SMatrix, SVector};
 
 use crate::{
-    BLOCKS, Drive, Estimate, Fact, FactMatrix, FactVector, Track, facts::FACTS, jackknife,
+    BLOCKS, Drive, Estimate, Fact, Track,
+    facts::{FACTS, FactVector},
+    jackknife,
 };
 
 /// Distances along the path between the two scans of a pair, m. The longer, the more a wrong fact
@@ -25,7 +27,8 @@ const MAX_PAIRS: usize = 900;
 const USUAL_SPREADS: f64 = 2.0;
 const ITERATIONS: usize = 6;
 
-/// A pair of parts: of the later scan, and of the earlier scan that it is aligned with.
+/// A pair of parts: of the later scan, and of the earlier scan that it is aligned with. A point is
+/// in a part as it was measured, whatever the facts.
 type Part = [fn(&SparsePoint) -> bool; 2];
 
 const LEFT: Part = [|point| point.y_m > 0.0; 2];
@@ -165,7 +168,7 @@ impl<'a> Pairs<'a> {
         let (here, slopes) = (self.measure(at)?, self.slopes(at)?);
         let solve = |left_out: Option<usize>| {
             (0..ITERATIONS).try_fold(FactVector::zeros(), |change, _| {
-                let mut information = FactMatrix::identity();
+                let mut information = SMatrix::<f64, FACTS, FACTS>::identity();
                 let mut moment = FactVector::zeros();
                 free.iter()
                     .for_each(|fact| information[(*fact as usize, *fact as usize)] = 0.0);
@@ -202,12 +205,14 @@ fn measure(
     let mut aligner = KeyframeAligner::new(&config.refinement, config.points.capacity)?;
     let compared = &COMPARED[..2 + usize::from(drive.alternates)];
     let measure = |pair: &Pair| {
+        let measured = [pair.later, pair.earlier].map(|scan| &drive.sweeps[scan].points);
         let scans = [pair.later, pair.earlier].map(|scan| drive.points(scan, change));
         let poses = [pair.later, pair.earlier].map(|scan| &track.poses[scan]);
         let initial = poses[1].inv_mul(poses[0]);
         let mut align = |part: &Part| -> Option<UncertainMotion> {
             let [later, earlier] = [0, 1].map(|k| {
-                let seen = scans[k].iter().copied().filter(part[k]);
+                let both = measured[k].iter().zip(&scans[k]);
+                let seen = both.filter_map(|(measured, point)| part[k](measured).then_some(*point));
                 let mut submap = Submap::default();
                 let twist = &track.twists[[pair.later, pair.earlier][k]];
                 submap.start(&seen.collect::<Vec<_>>(), twist);
