@@ -93,6 +93,8 @@ fn without_a_ground_truth_a_run_is_compared_with_itself() {
         assert!(verdict.starts_with(word), "{ended:?}");
         // The drive is too short for the constants.
         assert!(verdict.contains("not determined: constants"), "{ended:?}");
+        finished!["evaluate", "--alone", "--json", run.out()]
+            .failed_with(&["leave out the options"]);
     }
 }
 

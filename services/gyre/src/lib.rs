@@ -89,7 +89,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Link { end } => return link::link(&end),
         Command::Doctor => return doctor(),
         Command::Evaluate(arguments) => {
-            return match arguments.run_alone() {
+            return match arguments.run_alone()? {
                 Some(run) => verdict::judge(run),
                 None => gyre_results::evaluate::evaluate(&arguments),
             };

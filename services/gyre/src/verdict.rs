@@ -1,7 +1,7 @@
 //! `gyre evaluate RUN` without a ground truth: compares a run with itself and with the sensors
 //! beside the radar.
 
-use std::{fs, path::Path, process::ExitCode};
+use std::{path::Path, process::ExitCode};
 
 use gyre_calibration::{Study, calibrate_sensor};
 use gyre_configuration::{
@@ -13,7 +13,8 @@ use gyre_datasets::{
 };
 use gyre_geometry::{Pose, pose, samples::SampleKind};
 use gyre_radar::Trajectory;
-use gyre_results::{judgement, require_results};
+use gyre_results::{SUMMARY, judgement, require_results};
+use gyre_storage as storage;
 use serde_json::Value;
 
 use crate::calibrate::{CalibrateArguments, Recorded};
@@ -69,10 +70,10 @@ pub fn judge(run: &Path) -> Result<ExitCode, Failure> {
         )
         .into());
     }
-    let summary: Value = serde_json::from_str(&fs::read_to_string(run.join("summary.json"))?)?;
+    let summary = read_summary(&run.join(SUMMARY))?;
     let arguments = CalibrateArguments::of_run(run);
     let recorded = Recorded::read(configuration.clone(), &arguments)?;
-    let mut checks = vec![motions(&summary)];
+    let mut checks = vec![ending(&summary), motions(&summary)];
     checks.extend(of_scans(&configuration, &summary)?);
     let sensors = of_sensors(&recorded)?;
     match recorded.study() {
@@ -112,16 +113,27 @@ pub fn judge(run: &Path) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(u8::from(!bad.is_empty())))
 }
 
+fn read_summary(path: &Path) -> Result<Value, Failure> {
+    let failed = |reason: String| format!("cannot read {}: {reason}", path.display());
+    let text = storage::read_text(path, storage::SETTINGS);
+    let text = text.map_err(|error| failed(error.to_string()))?;
+    Ok(serde_json::from_str(&text).map_err(|error| failed(error.to_string()))?)
+}
+
+fn ending(summary: &Value) -> Check {
+    let ending = summary["ending"].as_str().unwrap_or("failed");
+    Check::new("ending", Some(ending == "complete"), ending.to_owned())
+}
+
 fn motions(summary: &Value) -> Check {
     let count = |name: &str| summary["motions"][name].as_f64().unwrap_or_default();
     let [refined, doubtful] = ["refined", "doubtful"].map(count);
-    let unmeasured = doubtful / (refined + doubtful).max(1.0);
+    let all = refined + doubtful;
     Check::new(
         "motions",
-        Some(unmeasured <= UNMEASURED),
+        (all > 0.0).then_some(doubtful <= UNMEASURED * all),
         format!(
-            "{doubtful} of {} are weak or predicted; at most {:.0} %",
-            refined + doubtful,
+            "{doubtful} of {all} are weak or predicted; at most {:.0} %",
             100.0 * UNMEASURED
         ),
     )
@@ -136,13 +148,22 @@ fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>
     let noise = i64::from(gyre_configuration::noise_floor(path, options)?);
     let threshold = i64::from(configuration.odometry.masking.floor());
     let above = threshold - noise;
-    let is_ignored = options.lost_azimuths == Some(LostAzimuthOption::Ignore);
-    let mut read = *options;
-    read.lost_azimuths = None;
-    let dataset = gyre_recording::open(path, &read)?;
-    let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default());
-    let stale = report.figures["rows"]["stale_scans"].as_u64().unwrap_or(0);
-    let repaired = &summary["lost"]["scans"];
+    let lost = match options.lost_azimuths {
+        Some(LostAzimuthOption::Ignore) => {
+            let mut read = *options;
+            read.lost_azimuths = None;
+            let dataset = gyre_recording::open(path, &read)?;
+            let report = inspect_dataset(path, dataset, &read, &InspectedLogs::default());
+            let lacking = report.figures["rows"]["stale_scans"].as_u64().unwrap_or(0);
+            let figure = format!("{lacking} scans lack azimuths, which the run ignored");
+            Check::new("lost azimuths", Some(lacking == 0), figure)
+        }
+        _ => {
+            let repaired = summary["lost"]["scans"].as_u64().unwrap_or(0);
+            let figure = format!("repaired in {repaired} scans");
+            Check::new("lost azimuths", Some(true), figure)
+        }
+    };
     Ok(vec![
         Check::new(
             "threshold",
@@ -153,15 +174,7 @@ fn of_scans(configuration: &Configuration, summary: &Value) -> Result<Vec<Check>
                 ABOVE_NOISE.end()
             ),
         ),
-        Check::new(
-            "lost azimuths",
-            Some(!(is_ignored && stale > 0)),
-            match (stale, is_ignored) {
-                (0, _) => "none".to_owned(),
-                (_, true) => format!("{stale} scans lack azimuths, and the run ignored it"),
-                (_, false) => format!("repaired in {repaired} scans"),
-            },
-        ),
+        lost,
     ])
 }
 
@@ -220,9 +233,10 @@ fn loops(summary: &Value) -> Check {
 /// have used.
 fn gnss(configuration: &Configuration, run: &Path) -> Result<Check, Failure> {
     const NAME: &str = "gnss";
-    let found = SampleLog::find(SampleKind::Gnss, &configuration.source.data);
-    let log = found.and_then(|file| SampleLog::read(SampleKind::Gnss, &file, None));
-    let log = match log {
+    let Ok(file) = SampleLog::find(SampleKind::Gnss, &configuration.source.data) else {
+        return Ok(Check::is_missing(NAME, "no fixes lie beside the scans"));
+    };
+    let log = match SampleLog::read(SampleKind::Gnss, &file, None) {
         Ok(log) => log,
         Err(error) => return Ok(Check::is_missing(NAME, &error.to_string())),
     };

@@ -4,10 +4,12 @@ mod arguments;
 mod objects;
 
 use std::{
+    ffi::OsStr,
     path::{Path, PathBuf},
     process::ExitCode,
 };
 
+use clap::{Args, Command, FromArgMatches};
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
@@ -78,11 +80,31 @@ fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> 
 
 impl EvaluateArguments {
     /// Returns the run that is to be compared with itself: it has no ground truth, or that is not
-    /// wanted.
-    pub fn run_alone(&self) -> Option<&Path> {
+    /// wanted. No option may compare it with one.
+    pub fn run_alone(&self) -> Result<Option<&Path>, Failure> {
         let run = self.estimate.as_path();
-        let has_none = || self.ground_truth.is_none() && truth_of_run(run).is_err();
-        (run.is_dir() && !self.objects && (self.alone || has_none())).then_some(run)
+        let is_alone = || self.alone || run.is_dir() && truth_of_run(run).is_err();
+        match self.is_plain() {
+            true => Ok(is_alone().then_some(run)),
+            false if self.alone => {
+                Err("--alone compares with no ground truth: leave out the options that do".into())
+            }
+            false => Ok(None),
+        }
+    }
+
+    /// Returns whether nothing but a trajectory is named, with `--alone` or without.
+    fn is_plain(&self) -> bool {
+        let command = Self::augment_args(Command::new("evaluate").no_binary_name(true));
+        let words = [OsStr::new("--"), self.estimate.as_os_str()];
+        let parsed = command.try_get_matches_from(words);
+        let plain = parsed.and_then(|parsed| Self::from_arg_matches(&parsed));
+        plain.is_ok_and(|plain| {
+            Self {
+                alone: self.alone,
+                ..plain
+            } == *self
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 use clap::Args;
 
 /// The arguments of `gyre evaluate`.
-#[derive(Debug, Args)]
+#[derive(Debug, PartialEq, Args)]
 pub struct EvaluateArguments {
     /// The trajectory to evaluate: the folder of a run's results, or a file in TUM, KITTI, or a
     /// dataset's own format.
@@ -16,7 +16,7 @@ pub struct EvaluateArguments {
     pub ground_truth: Option<PathBuf>,
     /// Compare a run with itself and with the sensors beside the radar, as where there is no ground
     /// truth: the exit code is 1 if the result is bad.
-    #[arg(long, conflicts_with_all = ["ground_truth", "objects"])]
+    #[arg(long)]
     pub alone: bool,
     /// Evaluate the objects of a run against those of the recording that is named in the place of
     /// the ground truth, a simulated one: its objects.csv and its ground_truth.tum.
