@@ -119,6 +119,11 @@ impl SampleLog {
     /// Returns the log that lies beside the scans of a dataset, which may also be named by the
     /// folder of the images; of the first file of a recording its own, if the kind has one.
     pub fn find(of: SampleKind, folder: &Path) -> Result<PathBuf, LogError> {
+        // Nothing lies beside a simulation.
+        if folder.as_os_str().is_empty() {
+            let folder = PathBuf::new();
+            return Err(LogError::None { of, folder });
+        }
         let kind = Kind::of(of);
         let mut beside = folder;
         if let Some(ending) = kind.of_recording {
