@@ -5,7 +5,6 @@ use std::{fs, io::Write, path::{Path, PathBuf}, process::ExitCode};
 use clap::Parser;
 use gyre_changes::{Change, ChangeKind, Changes, Survey, changes, near_fixes};
 use gyre_configuration::{Configuration, terminal::{Failure, print}};
-use gyre_datasets::ground_truth::read_trajectory;
 use gyre_slam::{localisation::{Localiser, PlacedDrive}, Keyframe, RecordReader, records_path};
 use gyre_storage::{self as storage, StorageError};
 use gyre_tools::maps::{localise, map::{self, placing}};
@@ -85,7 +84,7 @@ fn open_earlier(earlier: &Path, configuration: &Configuration) -> Result<Localis
     match has_keyframes || is_run {
         true => {
             let mut of_run = map::open(earlier)?;
-            let poses = read_trajectory(&map::trajectory_of(earlier))?;
+            let poses = map::Poses::read(earlier, None)?;
             localise::plan(map::placed(&mut of_run, &poses)?, configuration)
         }
         false => localise::localiser(earlier, configuration),

@@ -28,7 +28,7 @@ use gyre_storage::StorageError;
 
 use crate::maps::folder;
 pub use arguments::{MapArguments, MapFormat};
-use poses::Poses;
+pub use poses::Poses;
 
 /// The corrected trajectory, and the trajectory of odometry.
 const CORRECTED: &str = "trajectory_slam.tum";
@@ -117,7 +117,7 @@ fn origin(arguments: &MapArguments) -> Result<Option<Origin>, Failure> {
 }
 
 /// Returns the trajectory of a run: the corrected one, if it has one.
-pub fn trajectory_of(run: &Path) -> PathBuf {
+fn trajectory_of(run: &Path) -> PathBuf {
     let corrected = run.join(CORRECTED);
     match corrected.is_file() {
         true => corrected,
