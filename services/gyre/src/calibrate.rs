@@ -168,7 +168,7 @@ impl Recorded {
             let pushed = match dataset.read(number, scan.slot()) {
                 Ok(geometry) => {
                     scan.geometry = geometry;
-                    drive.push(number, &scan).map_err(|error| error.to_string())
+                    drive.push(&scan).map_err(|error| error.to_string())
                 }
                 Err(error) => Err(error.to_string()),
             };

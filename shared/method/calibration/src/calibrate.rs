@@ -27,7 +27,7 @@ pub struct Calibration {
 /// `progress` is called some ten times a round.
 pub fn calibrate(drive: &Drive, progress: &dyn Fn()) -> Result<Calibration, CalibrationError> {
     let track = drive.mean_track()?;
-    let path_m = track.path_m().last().copied().unwrap_or_default();
+    let path_m = track.length_m();
     if path_m < MIN_PATH_M {
         let scans = drive.sweeps.len();
         return Err(CalibrationError::Unusable(format!(

@@ -1,7 +1,7 @@
 //! The drive: its scans as points, and its track by odometry under assumed facts.
 
 use gyre_geometry::{
-    OwnedScan, PolarScan, Pose, Sense, SparsePoint, Twist, UncertainMotion,
+    OwnedScan, PolarScan, Pose, Sense, SparsePoint, Twist, interpolate,
     samples::SensorConfigs,
     scan::{ScanError, flag},
 };
@@ -25,7 +25,6 @@ const MOVING_M: f64 = 0.5;
 
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    pub number: usize,
     pub stamp_ns: i64,
     /// Time since the scan before, s; 0 where the chain of motions starts.
     pub interval_s: f64,
@@ -48,7 +47,8 @@ pub struct Drive {
 #[derive(Clone, Debug)]
 pub struct Track {
     pub poses: Vec<Pose>,
-    pub motions: Vec<UncertainMotion>,
+    /// From scan to scan.
+    pub motions: Vec<Pose>,
     pub twists: Vec<Twist>,
     starts: Vec<bool>,
 }
@@ -70,8 +70,8 @@ impl Drive {
         &self.config
     }
 
-    /// Adds the next scan, which has this number in the recording.
-    pub fn push(&mut self, number: usize, scan: &OwnedScan) -> Result<(), OdometryError> {
+    /// Adds the next scan.
+    pub fn push(&mut self, scan: &OwnedScan) -> Result<(), OdometryError> {
         let mut scan = scan.view();
         if scan.geometry.doppler_s == 0.0 {
             scan.geometry.doppler_s = NO_DOPPLER_S;
@@ -93,7 +93,6 @@ impl Drive {
             false => self.odometry.points().to_vec(),
         };
         self.sweeps.push(Sweep {
-            number,
             stamp_ns: scan.geometry.stamp_ns,
             interval_s: match registered.outcome {
                 Outcome::Start => 0.0,
@@ -157,10 +156,7 @@ impl Drive {
     pub fn reversal(&self) -> Result<[f64; 2], SettingError> {
         let [forward, reversed] = [false, true].map(|it| self.track(&FactVector::zeros(), it));
         let (forward, reversed) = (forward?, reversed?);
-        let [length_m, other_m] = [&forward, &reversed].map(|it| {
-            let path_m = it.path_m();
-            path_m.last().copied().unwrap_or_default().max(1e-3)
-        });
+        let [length_m, other_m] = [&forward, &reversed].map(|it| it.length_m().max(1e-3));
         let ends = [&forward, &reversed].map(|it| it.poses.last().map(|pose| pose.rotation));
         let turn_rad = match ends {
             [Some(one), Some(other)] => (one.inverse() * other).angle(),
@@ -177,7 +173,7 @@ impl Drive {
             &SensorConfigs::default(),
             self.config.points.capacity,
         )?;
-        let mut motions = vec![UncertainMotion::identity(); count];
+        let mut motions = vec![Pose::identity(); count];
         let mut earlier: Option<(usize, Vec<SparsePoint>)> = None;
         for number in 0..count {
             let scan = if reversed { count - 1 - number } else { number };
@@ -205,10 +201,8 @@ impl Drive {
                         &searched,
                         sweep.interval_s,
                     ));
-                    motions[later] = refined.motion.alone();
-                    if reversed {
-                        motions[later].motion = motions[later].motion.inverse();
-                    }
+                    let motion = refined.motion.alone().motion;
+                    motions[later] = if reversed { motion.inverse() } else { motion };
                 }
             }
             earlier = Some((scan, points));
@@ -218,11 +212,11 @@ impl Drive {
 }
 
 impl Track {
-    fn new(motions: Vec<UncertainMotion>, drive: &Drive) -> Self {
+    fn new(motions: Vec<Pose>, drive: &Drive) -> Self {
         let mut poses: Vec<Pose> = Vec::with_capacity(motions.len());
         for motion in &motions {
             let before = poses.last().copied().unwrap_or_else(Pose::identity);
-            let mut next = before * motion.motion;
+            let mut next = before * motion;
             next.rotation.renormalize();
             poses.push(next);
         }
@@ -241,11 +235,15 @@ impl Track {
 
     pub fn path_m(&self) -> Vec<f64> {
         let mut path_m = 0.0;
-        let up_to = |motion: &UncertainMotion| {
-            path_m += motion.motion.translation.vector.norm();
+        let up_to = |motion: &Pose| {
+            path_m += motion.translation.vector.norm();
             path_m
         };
         self.motions.iter().map(up_to).collect()
+    }
+
+    pub fn length_m(&self) -> f64 {
+        self.path_m().last().copied().unwrap_or_default()
     }
 
     pub(crate) fn is_broken(&self, earlier: usize, later: usize) -> bool {
@@ -254,10 +252,7 @@ impl Track {
 
     fn mean(&self, other: &Self, drive: &Drive) -> Self {
         let motions = self.motions.iter().zip(&other.motions);
-        let motions = motions.map(|(a, b)| UncertainMotion {
-            motion: gyre_geometry::interpolate(&a.motion, &b.motion, 0.5),
-            covariance: a.covariance,
-        });
+        let motions = motions.map(|(own, others)| interpolate(own, others, 0.5));
         Self::new(motions.collect(), drive)
     }
 }

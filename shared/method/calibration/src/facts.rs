@@ -22,7 +22,7 @@ impl Fact {
 
     /// Returns the standard deviation above which a drive adds nothing to the prior knowledge about
     /// any radar.
-    pub fn useful_sigma(self) -> f64 {
+    pub(crate) fn useful_sigma(self) -> f64 {
         [0.2, 0.6e-3, 0.01][self as usize]
     }
 

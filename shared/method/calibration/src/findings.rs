@@ -111,7 +111,7 @@ impl Study {
         };
         let mut found = Found {
             scans: drive.sweeps.len(),
-            path_m: calibration.track.path_m().last().copied().unwrap_or(0.0),
+            path_m: calibration.track.length_m(),
             pairs: calibration.pairs,
             has_settled: calibration.has_settled,
             constants: Fact::ALL.map(constant).to_vec(),
@@ -221,8 +221,7 @@ impl Found {
             self.notes.push((RESOLUTION.1, note));
             return Ok(());
         };
-        let track = drive.mean_track_with(&self.change())?;
-        let path_m = track.path_m().last().copied().unwrap_or_default();
+        let path_m = drive.mean_track_with(&self.change())?.length_m();
         self.path_m = path_m;
         let ratio = distance_m / path_m;
         if !PLAUSIBLE_RATIO.contains(&ratio) {

@@ -34,7 +34,7 @@ fn calibrated(profile: Profile, wrong_by: [f64; 3]) -> Calibration {
     let mut drive = Drive::new(&OdometryConfig::default()).unwrap();
     for index in 0..dataset.len() {
         scan.geometry = dataset.read(index, scan.slot()).unwrap();
-        drive.push(index, &scan).unwrap();
+        drive.push(&scan).unwrap();
     }
     calibrate(&drive, &|| ()).unwrap()
 }

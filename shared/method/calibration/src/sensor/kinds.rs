@@ -93,7 +93,7 @@ pub static GYRO: Kind = Kind {
 pub static WHEELS: Kind = Kind {
     sensor: SampleKind::Wheels,
     subject: "wheels are",
-    step: |track, _, later| track.motions[later].motion.translation.x,
+    step: |track, _, later| track.motions[later].translation.x,
     compared: "distances",
     axes: 1,
     has_bias: false,
