@@ -44,7 +44,7 @@ const LABELS: [Label; FACTS] = [
     ),
     ("doppler_s", "Doppler shift", "s", 1.0),
 ];
-const RESOLUTION: Label = ("range_resolution_m", "range resolution", "m", 1.0);
+const RESOLUTION: Label = ("range_resolution_m", "range resolution", "mm", 1e3);
 
 #[derive(Clone)]
 struct Constant {
@@ -300,14 +300,13 @@ impl fmt::Display for Verdict {
 fn reflections(own: &OwnReflections, configured_m: f64) -> String {
     match own.end_m() {
         None => "too few moving scans to find them".to_owned(),
+        Some(0.0) => "nothing stays in place in nine of ten moving scans".to_owned(),
         Some(end_m) if end_m >= OwnReflections::REACH_M => format!(
             "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to find them"
         ),
-        Some(end_m) => {
-            format!(
-                "to {end_m:.2} m in nine of ten moving scans; points.min_range_m = {configured_m}"
-            )
-        }
+        Some(end_m) => format!(
+            "to {end_m:.2} m in nine of ten moving scans; points.min_range_m = {configured_m}"
+        ),
     }
 }
 
