@@ -52,10 +52,6 @@ impl Pair {
         self.earlier_for_pair.is_some()
     }
 
-    pub fn later_points(&self) -> &[SparsePoint] {
-        self.later.points()
-    }
-
     pub fn earlier_points(&self) -> &[SparsePoint] {
         self.earlier.points()
     }

@@ -38,14 +38,6 @@ impl Submap {
         self.all.extend(&self.added, pose);
     }
 
-    pub fn len(&self) -> usize {
-        self.all.weight.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Returns the points in the frame of the middle keyframe: x and y in m, and the weight.
     pub fn points(&self) -> impl Iterator<Item = [f32; 3]> {
         let places = self.all.x_m.iter().zip(&self.all.y_m);
@@ -110,7 +102,7 @@ mod tests {
         );
         let mut raster = Array2::from_elem((17, 17), 9.0);
         assert!(submap.draw(1.0, raster.view_mut()).is_ok());
-        assert_eq!(submap.len(), 3);
+        assert_eq!(submap.points().count(), 3);
         assert!((raster[[8 - 4, 8 + 1]] - 0.5).abs() < 1e-6);
         assert!((raster[[8 - 2, 8 - 3]] - 0.5).abs() < 1e-5);
         assert!((raster.sum() - 1.0).abs() < 1e-5);
