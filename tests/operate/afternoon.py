@@ -1,9 +1,9 @@
-"""An afternoon of a robot, in minutes: it boots before its radar, loses it, fills its log, is reset, killed and upgraded, starts in its map, and each pose is
-accounted for at the end.
+"""An afternoon of a robot, in minutes: it boots before its radar, loses it, fills its log and its disk, is reset, killed and upgraded, starts in its map, and
+each pose is accounted for at the end.
 
-    afternoon.py GYRE FOLDER
+    unshare --map-root-user --mount afternoon.py GYRE FOLDER
 
-prints a line for each event. FOLDER is empty. The radar is `gyre radar-server` with the demo; when it is started again its clock steps back."""
+prints a line for each event. FOLDER is empty, and gets a disk of its own. The radar is `gyre radar-server` with the demo; when it is started again its clock steps back."""
 
 import json
 import os
@@ -15,6 +15,8 @@ import sys
 import time
 
 gyre, folder = map(os.path.abspath, sys.argv[1:])
+subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1g", "none", folder], check=True)
+os.chdir(folder)
 began = time.monotonic()
 out, config = f"{folder}/out", f"{folder}/robot.toml"
 with socket.socket() as free:
@@ -117,6 +119,21 @@ try:
         file.write(lines * ((9 << 20) // len(lines)))
     until("a short log", lambda: os.path.getsize(log) < 1 << 20)
     report("has turned its log over", kept=os.path.getsize(f"{log}.old"))
+
+    filler = f"{folder}/filler"
+    with open(filler, "wb", buffering=0) as file:
+        for size in (1 << 20, 1 << 12, 1):
+            try:
+                while file.write(bytes(size)) == size:
+                    pass
+            except OSError:
+                pass
+    until("a full disk", lambda: status()["disk_is_full"])
+    await_poses(10)
+    report("continues on a full disk", poses=status()["poses"])
+    os.remove(filler)
+    until("room on the disk", lambda: not status()["disk_is_full"])
+    report("has written what it held", poses=status()["poses"])
 
     report(call("reset", out, "--pose", "5,2,90", "--keep-map").strip())
     await_poses(5)

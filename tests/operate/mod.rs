@@ -1,6 +1,7 @@
 //! Operation: commands, services, swaps, load, and the machine that a run is on.
 
 mod batch;
+mod benchmark;
 mod calibrate;
 pub mod commands;
 mod doctor;

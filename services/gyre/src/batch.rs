@@ -28,7 +28,7 @@ use crate::{
 const ENDING: Duration = Duration::from_secs(60);
 const LOOK: Duration = Duration::from_millis(200);
 
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct BatchArguments {
     /// The drives: a text file with the path of a recording in each line, a CSV file with the
     /// columns drive, name, configuration and set, or a folder whose sub-folders are recordings.
@@ -61,6 +61,11 @@ pub struct BatchArguments {
 /// Computes the drives of a list that are not complete, and writes the table. The exit code is 0 if
 /// all are complete, 1 if not, and 130 after an interruption.
 pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
+    rows(arguments).map(|(_, code)| code)
+}
+
+/// As [`batch`]; returns the rows of the drives too.
+pub fn rows(arguments: &BatchArguments) -> Result<(Vec<Row>, ExitCode), Failure> {
     let list = List::read(&arguments.list)?;
     let configuration = arguments.config.as_deref().map(placed).transpose()?;
     let mut list = list.with(configuration.as_deref(), &arguments.set);
@@ -102,11 +107,12 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         lines.for_each(print::note);
     }
     print::line(said)?;
-    Ok(match (interrupted, incomplete.next()) {
+    let code = match (interrupted, incomplete.next()) {
         (true, _) => ExitCode::from(INTERRUPTED),
         (false, None) => ExitCode::SUCCESS,
         (false, Some(_)) => ExitCode::FAILURE,
-    })
+    };
+    Ok((rows, code))
 }
 
 /// Returns the absolute path of a configuration, or its path in the program.

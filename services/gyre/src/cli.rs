@@ -25,6 +25,7 @@ use gyre_tools::{
 use crate::{
     arguments::{LinkEnd, Ros2Arguments, RunArguments, RunOptions},
     batch::BatchArguments,
+    benchmark::BenchmarkArguments,
     calibrate::CalibrateArguments,
     inspect::InspectArguments,
     record::RecordArguments,
@@ -60,6 +61,9 @@ pub enum Command {
     /// Run the pipeline on many drives, and write a table of their results. The same command
     /// continues after an interruption.
     Batch(BatchArguments),
+    /// Run the pipeline on drives of a dataset, evaluate them by the rules of its benchmark, and
+    /// write the files that the benchmark accepts.
+    Benchmark(BenchmarkArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
     #[command(hide = true, name = gyre_tools::batch::COMMAND)]
     BatchDrive(RunArguments),

@@ -4,6 +4,7 @@
 
 pub mod arguments;
 pub mod batch;
+pub mod benchmark;
 pub mod calibrate;
 pub mod cli;
 pub mod conformance;
@@ -82,6 +83,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Swap(arguments) => return gyre_tools::operate::swap(&arguments),
         Command::Shadow(arguments) => return gyre_tools::conformance::shadow::shadow(&arguments),
         Command::Batch(arguments) => return batch::batch(&arguments),
+        Command::Benchmark(arguments) => return benchmark::benchmark(&arguments),
         Command::BatchDrive(arguments) => return batch::drive(&arguments),
         Command::Stress(arguments) => return stress::stress(&arguments),
         Command::Record(arguments) => return record::record(&arguments),

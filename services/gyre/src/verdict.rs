@@ -9,9 +9,12 @@ use gyre_configuration::{
     terminal::{Failure, print},
 };
 use gyre_datasets::{
-    InspectedLogs, LostAzimuthOption, SampleLog, ground_truth::read_trajectory, inspect_dataset,
+    InspectedLogs, LostAzimuthOption, ground_truth::read_trajectory, inspect_dataset,
 };
-use gyre_geometry::{Pose, pose, samples::SampleKind};
+use gyre_geometry::{
+    Pose, pose,
+    samples::{GnssConfig, SensorKind},
+};
 use gyre_radar::Trajectory;
 use gyre_results::{SUMMARY, judgement, require_results};
 use gyre_storage as storage;
@@ -233,12 +236,17 @@ fn loops(summary: &Value) -> Check {
 /// have used.
 fn gnss(configuration: &Configuration, run: &Path) -> Result<Check, Failure> {
     const NAME: &str = "gnss";
-    let Ok(file) = SampleLog::find(SampleKind::Gnss, &configuration.source.data) else {
-        return Ok(Check::is_missing(NAME, "no fixes lie beside the scans"));
+    let beside = GnssConfig {
+        kind: SensorKind::Auto,
+        ..configuration.gnss.clone()
     };
-    let log = match SampleLog::read(SampleKind::Gnss, &file, None) {
-        Ok(log) => log,
-        Err(error) => return Ok(Check::is_missing(NAME, &error.to_string())),
+    let log = match gyre_recording::gnss_log(&beside, &configuration.source.data, run) {
+        Ok(Some(log)) => log,
+        Ok(None) => return Ok(Check::is_missing(NAME, "no fixes")),
+        Err(error) => {
+            let figure = format!("scale and sense of the turns are not checked: {error}");
+            return Ok(Check::is_missing(NAME, &figure));
+        }
     };
     let fixes = log.on_radar(&configuration.gnss);
     let mut fixes = Trajectory::timed(

@@ -2,6 +2,7 @@
 
 pub mod bar;
 pub mod batch;
+pub mod benchmark;
 pub mod conformance;
 pub mod doctor;
 pub mod export;

@@ -59,7 +59,7 @@ impl Content {
     pub const PLOTS: Self = Self("gyre evaluate", LOCK, "trajectory.svg errors.svg bands.svg");
     pub const STRESS: Self = Self("gyre stress", LOCK, "config.toml report.json");
     pub const SHADOW: Self = Self("gyre shadow", LOCK, "shadow.csv shadow.json shadow.txt");
-    pub const BATCH: Self = Self("gyre batch", "rows", "results.csv times.csv");
+    pub const BATCH: Self = Self("gyre batch", "rows", "results.csv times.csv benchmark.csv");
     pub const SIMULATION: Self = Self("gyre simulate", "simulation.toml", "dataset.toml ground_truth.tum azimuth_poses.npy objects.csv imu.csv wheels.csv gnss.csv Navtech_Polar.txt");
 }
 

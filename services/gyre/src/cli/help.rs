@@ -33,6 +33,7 @@ gyre export out/drive --format radiate --out repaired
 Many drives, another radar:
 gyre batch DRIVES --config oxford
 gyre batch drives.csv --out out/batch --jobs 4
+gyre benchmark boreas DRIVES --out out/boreas
 gyre calibrate robot.toml DRIVE --distance-m 1520
 gyre calibrate DRIVE --with ANOTHER-DRIVE
 gyre masks DRIVE

@@ -242,15 +242,16 @@ impl Found {
         Ok(())
     }
 
-    /// Returns whether the drive agrees with the configured constants; `None` if it determines none
-    /// of them.
+    /// Returns whether the drive agrees with the configured constants: a value that is too
+    /// uncertain to be used may contradict them too. `None` if it determines none of them.
     pub fn agrees(&self) -> Option<bool> {
-        let verdicts = || self.constants.iter().map(|constant| constant.verdict);
-        match verdicts().all(|it| it == Verdict::Undetermined) {
-            true => None,
-            false => {
-                Some(verdicts().all(|it| matches!(it, Verdict::Undetermined | Verdict::Agrees)))
-            }
+        let mut constants = self.constants.iter();
+        let contradicts = |it: &Constant| it.found.contradicts(it.configured);
+        match constants.clone().any(contradicts) {
+            true => Some(false),
+            false => constants
+                .any(|it| it.verdict == Verdict::Agrees)
+                .then_some(true),
         }
     }
 

@@ -15,10 +15,10 @@ mod search;
 
 use gyre_geometry::{
     ComposedMotion, LostAzimuths, OdometryMotion, PolarScan, SparsePoint, Twist, UncertainMotion,
-    samples::{Evidence, Sample, SampledSensors, Witness},
+    samples::{Sample, SampledSensors, Witness},
 };
 use gyre_masking::Masker;
-use gyre_radar::{DopplerEstimator, LostAzimuthFinder, NoDoppler, PlacedRows};
+use gyre_radar::{DopplerEstimator, LostAzimuthFinder, PlacedRows};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{JointMatch, Refined, Refiner, Searched};
@@ -40,8 +40,6 @@ pub struct Odometry {
     twists: LaggedTwists,
     sensors: SampledSensors,
     doppler: Option<DopplerEstimator>,
-    /// The velocity of the last scan, measured by `doppler`.
-    velocity: Option<Result<Evidence, NoDoppler>>,
     min_range_m: f32,
     finder: LostAzimuthFinder,
     /// Where azimuths of the last scan were lost, and a buffer for its rows at their bearings.
@@ -76,7 +74,6 @@ impl Odometry {
                 .doppler
                 .is_used()
                 .then(DopplerEstimator::default),
-            velocity: None,
             min_range_m: config.points.min_range_m,
             finder: LostAzimuthFinder::default(),
             lost: LostAzimuths::default(),
@@ -133,10 +130,8 @@ impl Odometry {
         let placed = self.rows.place(scan, &self.lost);
         self.pair.mask(&mut self.masker, &placed, twist)?;
         let doppler = self.doppler.as_mut();
-        self.velocity = doppler.map(|it| it.estimate(&placed, self.min_range_m));
-        let velocity = self.velocity.as_ref().and_then(|it| it.as_ref().ok());
-        let velocity = velocity.copied().unwrap_or_default();
-        self.pair.later.evidence[Witness::Doppler as usize] = velocity;
+        let velocity = doppler.and_then(|it| it.estimate(&placed, self.min_range_m).ok());
+        self.pair.later.evidence[Witness::Doppler as usize] = velocity.unwrap_or_default();
         let variance_rad2 = self.lost.variance_of_mean_rad2(scan.geometry.azimuths);
         self.pair.later.azimuth_variance_rad2 = variance_rad2;
         Ok(())
@@ -229,12 +224,6 @@ impl Odometry {
 
     pub fn points(&self) -> &[SparsePoint] {
         self.pair.earlier_points()
-    }
-
-    /// Returns the velocity of the radar by the Doppler shift of the last scan, or the reason for
-    /// its absence; `None` before the first scan, and without `[doppler]`.
-    pub fn doppler(&self) -> Option<&Result<Evidence, NoDoppler>> {
-        self.velocity.as_ref()
     }
 
     /// Returns where azimuths of the last scan were lost. [`PlacedRows`] puts the rows behind these

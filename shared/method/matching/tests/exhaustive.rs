@@ -1,6 +1,6 @@
 //! The exhaustive search on known motions, and the inputs that it rejects.
 
-use crate::common::{Motion, Numbers, draw, pair, pair_of, scene_aside};
+use crate::common::{Numbers, draw, errors, pair, pair_of, pose_deg, scene_aside};
 use gyre_matching::{ExhaustiveConfig, ExhaustiveSearch, JointMatch, Overlap, Peak};
 use ndarray::Array2;
 
@@ -17,16 +17,6 @@ fn search(
         .unwrap()
 }
 
-fn errors(found: &JointMatch, motion: Motion) -> [f64; 3] {
-    let turn = (found.motion.yaw_rad - motion.yaw + std::f64::consts::PI)
-        .rem_euclid(std::f64::consts::TAU);
-    [
-        found.motion.x_m - motion.x,
-        found.motion.y_m - motion.y,
-        (turn - std::f64::consts::PI).to_degrees(),
-    ]
-}
-
 /// A rotation by zero does not blur; without compensation the peak would be pushed off zero.
 #[test]
 fn small_angles_are_not_pushed_off_zero() {
@@ -39,7 +29,7 @@ fn small_angles_are_not_pushed_off_zero() {
     for seed in 0..6 {
         // A new scene of speckles a cell wide, which blurring changes most.
         let found = |yaw_deg: f64| {
-            let motion = Motion::degrees(1.2, 0.4, yaw_deg);
+            let motion = pose_deg(1.2, 0.4, yaw_deg);
             let scene = crate::common::scatterers(1500, 60.0, 70 + seed);
             let (earlier, later) = pair_of(&scene, 127, 0.8, 0.6, motion);
             search(127, 0.8, &config, &earlier, &later).motion
@@ -65,10 +55,10 @@ fn motions_within_reach_are_found_to_a_fraction_of_a_cell() {
         let mut squares = [0.0; 3];
         for k in 0..16 {
             let [x_m, y_m, yaw_deg] = [9.0, 9.0, 14.0].map(|limit| numbers.within(limit));
-            let motion = Motion::degrees(x_m, y_m, yaw_deg);
+            let motion = pose_deg(x_m, y_m, yaw_deg);
             let (earlier, later) = pair(n, cell_m, motion, 300 + k);
             let found = search(n, cell_m, &config, &earlier, &later);
-            for (square, error) in squares.iter_mut().zip(errors(&found, motion)) {
+            for (square, error) in squares.iter_mut().zip(errors(&found.motion, &motion)) {
                 *square += error * error / 16.0;
             }
         }
@@ -80,7 +70,7 @@ fn motions_within_reach_are_found_to_a_fraction_of_a_cell() {
 
 #[test]
 fn an_angle_at_the_end_of_the_grid_is_uncertain() {
-    let (earlier, later) = pair(127, 0.8, Motion::degrees(0.0, 0.0, 4.0), 9);
+    let (earlier, later) = pair(127, 0.8, pose_deg(0.0, 0.0, 4.0), 9);
     let config = ExhaustiveConfig {
         reach_deg: 3.0,
         ..Default::default()
@@ -116,7 +106,7 @@ fn two_matches_are_both_reported() {
 
 #[test]
 fn rasters_without_a_match_give_no_motion_and_a_wide_covariance() {
-    let (earlier, later) = pair(65, 0.8, Motion::degrees(1.0, 0.0, 2.0), 1);
+    let (earlier, later) = pair(65, 0.8, pose_deg(1.0, 0.0, 2.0), 1);
     let empty = Array2::zeros((65, 65));
     for (f, g) in [(&empty, &empty), (&later, &empty), (&empty, &earlier)] {
         let found = search(65, 0.8, &ExhaustiveConfig::default(), g, f);
@@ -144,7 +134,7 @@ fn rasters_of_another_shape_and_impossible_reaches_are_rejected() {
 
 #[test]
 fn results_do_not_depend_on_earlier_searches() {
-    let (earlier, later) = pair(97, 0.8, Motion::degrees(2.0, -1.0, 5.0), 2);
+    let (earlier, later) = pair(97, 0.8, pose_deg(2.0, -1.0, 5.0), 2);
     let fresh = search(97, 0.8, &ExhaustiveConfig::default(), &earlier, &later);
     let mut used = ExhaustiveSearch::new(97, 0.8, &ExhaustiveConfig::default()).unwrap();
     let bright = Array2::from_elem((97, 97), 5.0);

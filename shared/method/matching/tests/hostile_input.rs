@@ -1,6 +1,6 @@
 //! Nothing that a raster may hold makes the search panic, lie or allocate.
 
-use crate::common::{Motion, pair, search};
+use crate::common::{pair, pose_deg, search};
 use gyre_matching::{
     RotationConfig, RotationForm, RotationSearch, TranslationConfig, TranslationSearch,
 };
@@ -22,7 +22,7 @@ fn empty_rasters_give_no_motion_and_a_wide_covariance() {
 
 #[test]
 fn a_few_cells_that_are_nan_change_little() {
-    let motion = Motion::degrees(1.0, 0.5, 3.0);
+    let motion = pose_deg(1.0, 0.5, 3.0);
     let (earlier, mut later) = pair(127, 0.4, motion, 8);
     later.iter_mut().step_by(997).for_each(|v| *v = f32::NAN);
     let found = search(127, 0.4, &Default::default(), &earlier, &later).1;

@@ -1,23 +1,16 @@
 //! Motions put into generated scenes come out of the search.
 
-use crate::common::{Motion, Numbers, pair, pair_of, search};
+use crate::common::{Numbers, errors, pair, pair_of, pose_deg, search};
+use gyre_geometry::Pose;
 use gyre_matching::{
     MotionMatch, Overlap, Peak, RotationConfig, RotationForm, Taper, TranslationConfig,
 };
 
 type Configs = (RotationConfig, TranslationConfig);
 
-fn recovered(n: usize, cell_m: f64, configs: &Configs, motion: Motion, seed: u64) -> MotionMatch {
+fn recovered(n: usize, cell_m: f64, configs: &Configs, motion: Pose, seed: u64) -> MotionMatch {
     let (earlier, later) = pair(n, cell_m, motion, seed);
     search(n, cell_m, configs, &earlier, &later).1
-}
-
-fn errors(found: &MotionMatch, motion: Motion) -> [f64; 3] {
-    [
-        found.x_m - motion.x,
-        found.y_m - motion.y,
-        (found.yaw_rad - motion.yaw).to_degrees(),
-    ]
 }
 
 #[test]
@@ -26,9 +19,9 @@ fn whole_range_of_angles_and_shifts_to_a_fraction_of_a_cell() {
     let (mut worst, mut squares, pairs) = ([0.0_f64; 3], [0.0; 3], 40);
     for k in 0..pairs {
         let [x_m, y_m, yaw_deg] = [8.0, 8.0, 19.5].map(|limit| numbers.within(limit));
-        let motion = Motion::degrees(x_m, y_m, yaw_deg);
+        let motion = pose_deg(x_m, y_m, yaw_deg);
         let found = recovered(n, cell_m, &Configs::default(), motion, 100 + k);
-        for (axis, error) in errors(&found, motion).into_iter().enumerate() {
+        for (axis, error) in errors(&found, &motion).into_iter().enumerate() {
             worst[axis] = worst[axis].max(error.abs());
             squares[axis] += error * error / pairs as f64;
         }
@@ -50,15 +43,18 @@ fn shifts_up_to_the_reach_are_found_in_every_direction() {
         (0.0, -11.9),
         (11.6, -11.6),
     ] {
-        let motion = Motion::degrees(x, y, 0.0);
-        let [dx, dy, _] = errors(&recovered(255, 0.4, &Configs::default(), motion, 5), motion);
+        let motion = pose_deg(x, y, 0.0);
+        let [dx, dy, _] = errors(
+            &recovered(255, 0.4, &Configs::default(), motion, 5),
+            &motion,
+        );
         assert!(dx.abs() < 0.2 && dy.abs() < 0.2, "{x} {y}: {dx} {dy}");
     }
 }
 
 #[test]
 fn every_form_of_the_search_finds_the_motion() {
-    let motion = Motion::degrees(2.3, -0.7, 6.4);
+    let motion = pose_deg(2.3, -0.7, 6.4);
     let (rotation, translation) = Configs::default();
     // Weston et al., Algorithm 1, and phase correlation (Checchin et al., Algorithm 1).
     let line14 = RotationConfig {
@@ -87,7 +83,7 @@ fn every_form_of_the_search_finds_the_motion() {
         ("Checchin et al.", (phase, phase_shift), [0.4, 1.0]),
     ];
     for (name, configs, [metres, degrees]) in forms {
-        let [dx, dy, dyaw] = errors(&recovered(255, 0.4, &configs, motion, 3), motion);
+        let [dx, dy, dyaw] = errors(&recovered(255, 0.4, &configs, motion, 3), &motion);
         assert!(
             dx.abs() < metres && dy.abs() < metres && dyaw.abs() < degrees,
             "{name}: {dx} {dy} {dyaw}"
@@ -107,9 +103,9 @@ fn every_form_of_the_search_finds_the_motion() {
 
 #[test]
 fn odd_and_even_rasters_of_any_size() {
-    let motion = Motion::degrees(1.1, 0.6, -4.0);
+    let motion = pose_deg(1.1, 0.6, -4.0);
     for n in [97, 127, 128, 200, 511] {
-        let [dx, dy, dyaw] = errors(&recovered(n, 0.4, &Configs::default(), motion, 11), motion);
+        let [dx, dy, dyaw] = errors(&recovered(n, 0.4, &Configs::default(), motion, 11), &motion);
         assert!(
             dx.abs() < 0.2 && dy.abs() < 0.2 && dyaw.abs() < 0.5,
             "{n}: {dx} {dy} {dyaw}"
@@ -120,7 +116,7 @@ fn odd_and_even_rasters_of_any_size() {
 /// A field that fills the raster: what shrinks with the shift is the overlap alone.
 #[test]
 fn energy_normalisation_removes_the_bias_toward_zero_shift() {
-    let (n, cell_m, motion) = (127, 0.4, Motion::degrees(8.0, 0.0, 0.0));
+    let (n, cell_m, motion) = (127, 0.4, pose_deg(8.0, 0.0, 0.0));
     let mean_error = |overlap: Overlap| {
         let config = TranslationConfig {
             overlap,
@@ -130,7 +126,7 @@ fn energy_normalisation_removes_the_bias_toward_zero_shift() {
         let error = |seed: u64| {
             let scene = crate::common::scatterers(5000, 60.0, 900 + seed);
             let (earlier, later) = pair_of(&scene, n, cell_m, 2.5, motion);
-            search(n, cell_m, &configs, &earlier, &later).1.x_m - motion.x
+            search(n, cell_m, &configs, &earlier, &later).1.x_m - motion.translation.x
         };
         (0..12).map(error).sum::<f64>() / 12.0
     };

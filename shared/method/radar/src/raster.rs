@@ -149,10 +149,6 @@ impl Rasteriser {
         })
     }
 
-    pub fn config(&self) -> &RasterConfig {
-        &self.config
-    }
-
     /// Writes the raster of `scan`: `n x n` powers above `floor`, from 0 to `255 - floor`.
     ///
     /// With a `twist` the raster is motion-compensated: it shows the scene as seen from the

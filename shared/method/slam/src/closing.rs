@@ -104,11 +104,6 @@ impl LoopCloser {
         self.path_m.len()
     }
 
-    /// Returns the number of keyframes described.
-    pub fn places(&self) -> usize {
-        self.index.len()
-    }
-
     /// Describes the next keyframe whose submap is complete; returns `None` without one. `read`
     /// reads a keyframe that was given to [`LoopCloser::push`].
     pub fn describe<E>(

@@ -24,12 +24,6 @@ impl Correction {
         }
     }
 
-    /// Returns the pose of the odometry frame in the map frame after the last keyframe (REP-105:
-    /// map -> odom); none without keyframes.
-    pub fn map_from_odometry(&self) -> Option<Pose> {
-        self.keyframes.last().map(|last| last.map_from_odometry)
-    }
-
     /// Corrects the pose of scan `seq` by odometry, which is returned as it is before the first
     /// keyframe.
     pub fn correct(&self, seq: u64, odometry: &Pose) -> Pose {

@@ -23,6 +23,7 @@ pub use constraint::{
 pub use error::EstimationError;
 pub use filter::TrajectoryFilter;
 pub use g2o::{G2o, G2oError};
+pub(crate) use graph::PHI;
 pub use graph::{
     GraphOptions, PoseGraph, Position, Solution, WeightedLoop, WeightedPosition, align,
 };

@@ -10,6 +10,8 @@ use gyre_slam::{
     localisation::{Fix, Localisation, Localiser, Map, Observation, Status},
 };
 use nalgebra::{Matrix3, Point2};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 use crate::common::assert_refused;
 
@@ -19,13 +21,8 @@ const PERIOD_NS: i64 = 250_000_000;
 
 /// Posts along 800 m of a street, at random places and of random strength.
 fn street() -> Vec<(Point2<f64>, f32)> {
-    let mut state = 1_u64;
-    let mut random = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        (state >> 40) as f64 / (1_u64 << 24) as f64
-    };
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut random = || rng.random::<f64>();
     let mut post = || {
         let aside_m = (6.0 + 30.0 * random()) * if random() < 0.5 { -1.0 } else { 1.0 };
         let place = Point2::new(-100.0 + 800.0 * random(), aside_m);

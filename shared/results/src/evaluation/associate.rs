@@ -79,7 +79,7 @@ fn by_time(
     let (mut kept, mut true_poses) = (Vec::new(), Vec::new());
     let (mut outside_span, mut in_gaps) = (0, 0);
     for (&stamp_ns, pose) in estimate.stamps().iter().zip(&estimate.poses) {
-        match truth_at(truth, stamp_ns, max_gap_ns) {
+        match pose_at(truth, stamp_ns, max_gap_ns) {
             At::Pose(true_pose) => {
                 kept.push(*pose);
                 true_poses.push(true_pose);
@@ -133,14 +133,26 @@ pub(crate) enum At {
     Gap,
 }
 
-/// Files have stamps in microseconds: a stamp that lies this close to an end of the ground truth
-/// lies on it.
+/// Files have stamps in microseconds: a stamp that lies this close to an end of a trajectory lies
+/// on it.
 const ROUNDING_NS: u64 = 1_000;
 
-/// Returns the ground truth at `stamp_ns`. A stamp that the ground truth has itself is never in a
-/// gap.
-pub(crate) fn truth_at(truth: &Trajectory, stamp_ns: i64, max_gap_ns: i64) -> At {
-    let stamps_ns = truth.stamps();
+/// Returns the poses at the multiples of `period_ns`, interpolated, but not in gaps.
+pub fn resampled(trajectory: &Trajectory, period_ns: i64) -> Trajectory {
+    let max_gap_ns = max_gap_ns(trajectory.stamps(), LEAST_GAP_NS);
+    let (first, last) = trajectory.span_ns().unwrap_or_default();
+    let steps = first.div_euclid(period_ns)..=last.div_euclid(period_ns);
+    let at = |stamp_ns| match pose_at(trajectory, stamp_ns, max_gap_ns) {
+        At::Pose(pose) => Some((stamp_ns, pose)),
+        At::Outside | At::Gap => None,
+    };
+    let (stamps, poses) = steps.filter_map(|step| at(step * period_ns)).unzip();
+    Trajectory::timed(stamps, poses)
+}
+
+/// Returns the pose at `stamp_ns`. A stamp that the trajectory has itself is never in a gap.
+pub(crate) fn pose_at(trajectory: &Trajectory, stamp_ns: i64, max_gap_ns: i64) -> At {
+    let stamps_ns = trajectory.stamps();
     let ends = [stamps_ns.first(), stamps_ns.last()];
     let is_end = |end: &&i64| stamp_ns.abs_diff(**end) <= ROUNDING_NS;
     let stamp_ns = *ends.into_iter().flatten().find(is_end).unwrap_or(&stamp_ns);
@@ -149,7 +161,7 @@ pub(crate) fn truth_at(truth: &Trajectory, stamp_ns: i64, max_gap_ns: i64) -> At
         return At::Outside;
     };
     if stamps_ns[before] == stamp_ns {
-        return At::Pose(truth.poses[before]);
+        return At::Pose(trajectory.poses[before]);
     }
     let Some(&after_ns) = stamps_ns.get(after) else {
         return At::Outside;
@@ -160,7 +172,7 @@ pub(crate) fn truth_at(truth: &Trajectory, stamp_ns: i64, max_gap_ns: i64) -> At
         return At::Gap;
     }
     let share = since(stamp_ns) as f64 / since(after_ns) as f64;
-    let [before, after] = [before, after].map(|at| &truth.poses[at]);
+    let [before, after] = [before, after].map(|at| &trajectory.poses[at]);
     At::Pose(interpolate(before, after, share))
 }
 
@@ -219,6 +231,18 @@ mod tests {
         assert_eq!(coverage, expected);
         let used: Vec<f64> = matched.estimate().iter().map(|p| p.translation.x).collect();
         assert_eq!(used, [1.0, 2.0, 3.0, 5.0]);
+    }
+
+    #[test]
+    fn poses_between_scans_are_interpolated_but_not_in_gaps() {
+        let scans = timed(&seconds(&[10.05, 10.3, 10.55, 12.05, 12.25]), &line(5));
+        let at_10_hz = resampled(&scans, SECOND / 10);
+        let expected = seconds(&[10.1, 10.2, 10.3, 10.4, 10.5, 12.1, 12.2]);
+        assert_eq!(at_10_hz.stamps(), expected);
+        let x = |pose: &Pose| (pose.translation.x * 1e9).round() / 1e9;
+        let x: Vec<f64> = at_10_hz.poses.iter().map(x).collect();
+        assert_eq!(x, [0.2, 0.6, 1.0, 1.4, 1.8, 3.25, 3.75]);
+        assert!(resampled(&Trajectory::default(), 1).is_empty());
     }
 
     #[test]

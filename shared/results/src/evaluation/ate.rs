@@ -5,6 +5,7 @@
 //! the alignment has no scale.
 
 use gyre_geometry::{Pose, xy_yaw};
+use nalgebra::Vector2;
 use serde::{Serialize, Serializer};
 
 use crate::evaluation::MatchedPoses;
@@ -52,7 +53,16 @@ pub(crate) fn aligned_rmse_m(estimate: &[Pose], truth: &[Pose]) -> f64 {
 /// Returns the least-squares alignment in closed form: the angle that maximises sum(t . R e) over
 /// centred positions is atan2(sum of cross products, sum of dot products).
 fn align_positions(estimate: &[Pose], truth: &[Pose]) -> Pose {
-    let (e0, t0) = (centroid(estimate), centroid(truth));
+    align_about(centroid(estimate), centroid(truth), estimate, truth)
+}
+
+/// Returns the least-squares alignment that takes the position `e0` to `t0`.
+pub(crate) fn align_about(
+    e0: Vector2<f64>,
+    t0: Vector2<f64>,
+    estimate: &[Pose],
+    truth: &[Pose],
+) -> Pose {
     let (mut cross, mut dot) = (0.0, 0.0);
     for (e, t) in estimate.iter().zip(truth) {
         let (e, t) = (e.translation.vector - e0, t.translation.vector - t0);
@@ -63,9 +73,9 @@ fn align_positions(estimate: &[Pose], truth: &[Pose]) -> Pose {
     Pose::from_parts((t0 - rotation * e0).into(), rotation)
 }
 
-fn centroid(poses: &[Pose]) -> nalgebra::Vector2<f64> {
+fn centroid(poses: &[Pose]) -> Vector2<f64> {
     let positions = poses.iter().map(|p| p.translation.vector);
-    positions.sum::<nalgebra::Vector2<f64>>() / poses.len() as f64
+    positions.sum::<Vector2<f64>>() / poses.len() as f64
 }
 
 fn distance_m(truth_from_estimate: &Pose, estimate: &Pose, truth: &Pose) -> f64 {

@@ -7,7 +7,7 @@ use gyre_radar::Trajectory;
 
 use crate::evaluation::{
     EvaluationError,
-    associate::{At, require_stamps, truth_at},
+    associate::{At, pose_at, require_stamps},
     error::{ESTIMATE, TRUTH},
     matched::require_poses,
 };
@@ -67,7 +67,7 @@ impl MatchedMotions {
         require_poses(TRUTH, &truth.poses)?;
         require_stamps(TRUTH, truth)?;
         require_motions(motions)?;
-        let at = |stamp_ns| match truth_at(truth, stamp_ns, max_gap_ns) {
+        let at = |stamp_ns| match pose_at(truth, stamp_ns, max_gap_ns) {
             At::Pose(pose) => Some(pose),
             At::Outside | At::Gap => None,
         };

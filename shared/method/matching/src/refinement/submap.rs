@@ -1,8 +1,7 @@
 use gyre_geometry::{Pose, SparsePoint, Twist};
-use ndarray::ArrayViewMut2;
+use ndarray::Array2;
 
 use super::points::DeskewedPoints;
-use crate::{ShapeError, expect_shape};
 
 /// The points of a keyframe and of the keyframes around it, in its frame.
 ///
@@ -38,14 +37,6 @@ impl Submap {
         self.all.extend(&self.added, pose);
     }
 
-    pub fn len(&self) -> usize {
-        self.all.weight.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Returns the points in the frame of the middle keyframe: x and y in m, and the weight.
     pub fn points(&self) -> impl Iterator<Item = [f32; 3]> {
         let places = self.all.x_m.iter().zip(&self.all.y_m);
@@ -54,40 +45,32 @@ impl Submap {
             .map(|((x_m, y_m), weight)| [*x_m, *y_m, *weight])
     }
 
-    /// Draws the submap: each cell of the square `raster`, row 0 far ahead, is the sum of the
-    /// weights of the points in it, each shared bilinearly between four cells of `cell_m` metres.
-    /// Points outside are left out.
-    pub fn draw(&self, cell_m: f64, mut raster: ArrayViewMut2<'_, f32>) -> Result<(), ShapeError> {
-        const WHAT: &str = "raster of a submap";
-        let n = raster.nrows();
-        expect_shape(WHAT, raster.dim().into(), [n, n])?;
-        let cells = raster
-            .as_slice_mut()
-            .ok_or_else(|| ShapeError::layout(WHAT))?;
-        cells.fill(0.0);
-        let (per_m, middle, last) = (1.0 / cell_m as f32, 0.5 * (n as f32 - 1.0), n as f32 - 1.0);
+    /// Draws the submap around the middle of `raster`, row 0 far ahead and column 0 far left: each
+    /// cell is the sum of the weights of the points in it, each shared bilinearly between four
+    /// cells of `cell_m` metres. Points outside are left out.
+    pub fn draw(&self, cell_m: f64, raster: &mut Array2<f32>) {
+        raster.fill(0.0);
+        let last = <[usize; 2]>::from(raster.dim()).map(|cells| cells as f32 - 1.0);
+        let per_m = 1.0 / cell_m as f32;
         for [x_m, y_m, weight] in self.points() {
-            let (u, v) = (middle - x_m * per_m, middle - y_m * per_m);
+            let (u, v) = (0.5 * last[0] - x_m * per_m, 0.5 * last[1] - y_m * per_m);
             // NaN is not inside.
-            if !((0.0..last).contains(&u) && (0.0..last).contains(&v)) {
+            if !((0.0..last[0]).contains(&u) && (0.0..last[1]).contains(&v)) {
                 continue;
             }
             let (i, j) = (u as usize, v as usize);
             let (across, along) = (u - i as f32, v - j as f32);
-            let first = i * n + j;
-            cells[first] += weight * (1.0 - across) * (1.0 - along);
-            cells[first + 1] += weight * (1.0 - across) * along;
-            cells[first + n] += weight * across * (1.0 - along);
-            cells[first + n + 1] += weight * across * along;
+            raster[[i, j]] += weight * (1.0 - across) * (1.0 - along);
+            raster[[i, j + 1]] += weight * (1.0 - across) * along;
+            raster[[i + 1, j]] += weight * across * (1.0 - along);
+            raster[[i + 1, j + 1]] += weight * across * along;
         }
-        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use gyre_geometry::pose;
-    use ndarray::Array2;
 
     use super::*;
 
@@ -109,16 +92,10 @@ mod tests {
             &pose(2.0, 0.0, quarter),
         );
         let mut raster = Array2::from_elem((17, 17), 9.0);
-        assert!(submap.draw(1.0, raster.view_mut()).is_ok());
-        assert_eq!(submap.len(), 3);
+        submap.draw(1.0, &mut raster);
+        assert_eq!(submap.points().count(), 3);
         assert!((raster[[8 - 4, 8 + 1]] - 0.5).abs() < 1e-6);
         assert!((raster[[8 - 2, 8 - 3]] - 0.5).abs() < 1e-5);
         assert!((raster.sum() - 1.0).abs() < 1e-5);
-    }
-
-    #[test]
-    fn a_raster_that_is_not_square_is_refused() {
-        let mut raster = Array2::zeros((4, 5));
-        assert!(Submap::default().draw(1.0, raster.view_mut()).is_err());
     }
 }

@@ -3,45 +3,44 @@
 
 pub mod scenes;
 
+use gyre_geometry::{Pose, pose, wrap_angle, xy_yaw};
 use gyre_matching::{
     MotionMatch, RotationConfig, RotationMatch, RotationSearch, TranslationConfig,
     TranslationSearch,
 };
 use ndarray::Array2;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
-    pub x: f64,
-    pub y: f64,
-    pub yaw: f64,
+/// A pose, m and degrees.
+pub fn pose_deg(x_m: f64, y_m: f64, yaw_deg: f64) -> Pose {
+    pose(x_m, y_m, yaw_deg.to_radians())
 }
 
-impl Motion {
-    pub fn degrees(x: f64, y: f64, yaw_deg: f64) -> Self {
-        Self {
-            x,
-            y,
-            yaw: yaw_deg.to_radians(),
-        }
-    }
-
-    /// A point of the earlier frame in the later one: x = R^T (x' - t), the inverse of Eq. 1.
-    pub fn seen_from_later(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let ((s, c), dx, dy) = (self.yaw.sin_cos(), x - self.x, y - self.y);
-        [c * dx + s * dy, -s * dx + c * dy]
-    }
+/// Returns by how much a match is off, m, m and degrees.
+pub fn errors(found: &MotionMatch, motion: &Pose) -> [f64; 3] {
+    let [x_m, y_m, yaw_rad] = xy_yaw(motion);
+    let turn = wrap_angle(found.yaw_rad - yaw_rad);
+    [found.x_m - x_m, found.y_m - y_m, turn.to_degrees()]
 }
 
-/// A generator of pseudo-random numbers in 0..1 (splitmix64).
+/// A generator of pseudo-random numbers (SplitMix64, Steele et al. 2014).
 pub struct Numbers(pub u64);
 
 impl Numbers {
-    pub fn next(&mut self) -> f64 {
+    fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        z ^ (z >> 31)
+    }
+
+    /// A number in 0..1.
+    pub fn next(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.bits() % end as u64) as usize
     }
 
     pub fn within(&mut self, limit: f64) -> f64 {
@@ -93,7 +92,7 @@ pub fn draw(
 
 /// The earlier and the later raster of a scene with 150 scatterers, around the sensor and beyond
 /// the raster's edge.
-pub fn pair(n: usize, cell_m: f64, motion: Motion, seed: u64) -> (Array2<f32>, Array2<f32>) {
+pub fn pair(n: usize, cell_m: f64, motion: Pose, seed: u64) -> (Array2<f32>, Array2<f32>) {
     let scene = scatterers(150, 0.75 * n as f64 * cell_m, seed);
     pair_of(&scene, n, cell_m, 1.2, motion)
 }
@@ -104,10 +103,12 @@ pub fn pair_of(
     n: usize,
     cell_m: f64,
     blur: f64,
-    motion: Motion,
+    motion: Pose,
 ) -> (Array2<f32>, Array2<f32>) {
     let earlier = draw(scene.iter().copied(), n, cell_m, blur);
-    let seen = scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s));
+    let seen = scene
+        .iter()
+        .map(|&(p, s)| (motion.inverse_transform_point(&p.into()).into(), s));
     (earlier, draw(seen, n, cell_m, blur))
 }
 

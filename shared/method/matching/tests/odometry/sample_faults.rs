@@ -16,6 +16,8 @@ use gyre_matching::{
 };
 use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
 
+use crate::common::Numbers;
+
 /// A drive that was masked and searched once: what refinement gets, scan by scan.
 struct Drive {
     dataset: Box<dyn Dataset>,
@@ -167,23 +169,6 @@ fn line(sample: &Sample) -> String {
 fn last(sample: &mut Sample) -> &mut f64 {
     let count = values(sample);
     &mut sample.values[count - 1]
-}
-
-/// SplitMix64 (Steele et al. 2014).
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        bits ^ (bits >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
 }
 
 const KINDS: [&str; 7] = [

@@ -22,6 +22,9 @@ pub use positions::{Position, WeightedPosition, align};
 use solve::Weights;
 use system::System;
 
+/// A loop keeps its weight up to this chi-square.
+pub(crate) const PHI: f64 = 0.25 * CHI_SQUARE_99_9;
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraphOptions {
     /// A loop whose chi-square against the odometry is larger is rejected.
@@ -37,9 +40,7 @@ impl Default for GraphOptions {
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
-            kernel: Kernel::DynamicCovarianceScaling {
-                phi: 0.25 * CHI_SQUARE_99_9,
-            },
+            kernel: Kernel::DynamicCovarianceScaling { phi: PHI },
             max_iterations: 100,
             tolerance: 1e-5,
         }

@@ -1,7 +1,5 @@
 //! Robust kernels: how much a loop counts that disagrees with the rest.
 
-use std::fmt;
-
 /// A robust kernel of the chi-square of a loop.
 /// The cost of a loop is half of a concave function of its chi-square c; the derivative of this
 /// function is the loop's weight.
@@ -44,18 +42,6 @@ impl Kernel {
             Self::DynamicCovarianceScaling { phi } => (2.0 * phi / (phi + chi_square)).min(1.0),
         };
         share * share
-    }
-}
-
-impl fmt::Display for Kernel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::None => f.write_str("none"),
-            Self::GemanMcClure { scale } => write!(f, "Geman-McClure, scale {scale}"),
-            Self::DynamicCovarianceScaling { phi } => {
-                write!(f, "dynamic covariance scaling, phi {phi}")
-            }
-        }
     }
 }
 

@@ -6,9 +6,7 @@ use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Estimator, TrajectoryEstimator};
-use crate::estimation::{
-    Constraint, G2o, GraphOptions, Kind, PoseGraph, Position, WeightedPosition,
-};
+use crate::estimation::{Constraint, G2o, Kind, PHI, PoseGraph, Position, WeightedPosition};
 
 /// A fix measures no heading: its standard deviation in a constraint is a whole turn and more, rad.
 const ANY_HEADING_RAD: f64 = 10.0;
@@ -26,11 +24,10 @@ impl TrajectoryEstimator {
         let priors = priors(graph);
         let constraints = self.odometry().chain(self.weighted_loops());
         let mut text = G2o::write(self.poses(), constraints.chain(priors.iter().copied()));
-        let kernel = GraphOptions::default().kernel;
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "# robust kernel: {kernel}. The information of each loop and fix is multiplied by its weight, and divided among those with dependent errors"
+            "# robust kernel: dynamic covariance scaling, phi {PHI}. The information of each loop and fix is multiplied by its weight, and divided among those with dependent errors"
         );
         if !priors.is_empty() {
             let _ = writeln!(

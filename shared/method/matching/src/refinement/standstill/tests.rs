@@ -2,6 +2,9 @@
 
 use gyre_geometry::pose;
 use nalgebra::{Matrix3, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 
 use super::*;
 
@@ -11,7 +14,7 @@ const SIGMA: [f64; 3] = [0.055, 0.055, 0.0035];
 
 struct Drive {
     standstill: Standstill,
-    random: u64,
+    rng: ChaCha8Rng,
     /// Standard deviation of the jitter relative to the covariances.
     jitter: f64,
     true_m: f64,
@@ -30,26 +33,13 @@ impl Drive {
     fn with_jitter(jitter: f64) -> Self {
         Self {
             standstill: Standstill::default(),
-            random: 1,
+            rng: ChaCha8Rng::seed_from_u64(1),
             jitter,
             true_m: 0.0,
             estimate: Pose::identity(),
             reported: Pose::identity(),
             path_m: 0.0,
         }
-    }
-
-    /// A number of mean 0 and variance 1.
-    fn noise(&mut self) -> f64 {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            self.random = self
-                .random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            sum += (self.random >> 40) as f64 / f64::from(1 << 24);
-        }
-        self.jitter * sum
     }
 
     /// Drives for so many scans at a speed that changes evenly between two, m/s.
@@ -64,7 +54,9 @@ impl Drive {
     }
 
     fn step(&mut self, outcome: Outcome, off_m: f64) -> Step {
-        let [x_m, y_m, yaw_rad] = SIGMA.map(|sigma| sigma * self.noise());
+        let mut error =
+            |sigma: f64| sigma * self.jitter * self.rng.sample::<f64, _>(StandardNormal);
+        let [x_m, y_m, yaw_rad] = SIGMA.map(&mut error);
         let previous = self.estimate;
         self.estimate = pose(self.true_m + x_m + off_m, y_m, yaw_rad);
         let variances = Vector3::from(SIGMA.map(|sigma| sigma * sigma));

@@ -95,7 +95,7 @@ impl Describer {
     /// Computes the descriptor of a submap. The descriptor of an empty submap is zero, and similar
     /// to no other.
     pub fn describe(&mut self, submap: &Submap, out: &mut Descriptor) {
-        submap.draw(CELL_M, self.raster.view_mut()).expect(PLANNED);
+        submap.draw(CELL_M, &mut self.raster);
         let raster = self.raster.view();
         self.search
             .spectrum(raster, &mut self.spectrum)

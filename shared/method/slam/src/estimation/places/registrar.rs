@@ -78,6 +78,6 @@ impl Registrar {
 
 /// Draws the root of a submap's weights: a few strong scatterers would outweigh all others.
 fn draw(submap: &Submap, raster: &mut Array2<f32>) {
-    submap.draw(CELL_M, raster.view_mut()).expect(PLANNED);
+    submap.draw(CELL_M, raster);
     raster.mapv_inplace(f32::sqrt);
 }

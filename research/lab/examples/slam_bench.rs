@@ -1,6 +1,8 @@
 //! Times and memory of SLAM on a drive of 20,000 keyframes and 500 loops, on this machine: a new
 //! loop, and the restart of trajectory and of loop-closure from the logs of a run. Times are
 //! processor time of one thread, so that other load counts little.
+//!
+//! `cargo run --release --manifest-path research/Cargo.toml -p gyre-lab --example slam_bench`
 #![allow(clippy::unwrap_used)]
 
 use std::{f64::consts::TAU, fs, path::Path, time::Duration};
