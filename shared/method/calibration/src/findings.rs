@@ -234,8 +234,8 @@ impl Found {
         Ok(())
     }
 
-    /// Returns whether the drive agrees with the configured constants: a value that is too uncertain
-    /// to be used may contradict them too. `None` if it determines none of them.
+    /// Returns whether the drive agrees with the configured constants: a value that is too
+    /// uncertain to be used may contradict them too. `None` if it determines none of them.
     pub fn agrees(&self) -> Option<bool> {
         let mut constants = self.constants.iter();
         let contradicts = |it: &Constant| it.found.contradicts(it.configured);
