@@ -319,7 +319,12 @@ impl fmt::Display for Constant {
         write!(
             f,
             "{name:<21} {found} {unit}, configured {configured:.4}: {verdict}"
-        )
+        )?;
+        let is_unlike = self.found.contradicts(self.configured);
+        match verdict == Verdict::Undetermined && is_unlike {
+            true => f.write_str(", but contradicts the configured value"),
+            false => Ok(()),
+        }
     }
 }
 
