@@ -61,6 +61,11 @@ impl View {
         }
     }
 
+    /// Returns the places of all returns, m, with their weights from 0 to 1.
+    pub fn points(&self) -> impl Iterator<Item = (Vector2<f64>, f64)> {
+        places(&self.points)
+    }
+
     /// Calls `take` with the place of each part of a return, m, and the amount that it adds there.
     pub(crate) fn returns(&self, mut take: impl FnMut(Point2<f64>, f64)) {
         let share = FULL_CELL_M / self.options.cell_m;
