@@ -115,7 +115,7 @@ fn poses_on_a_full_disk_are_written_when_there_is_room_again() {
     await_status(&run, "room on the disk", |status| {
         status["disk_is_full"] == false
     });
-    // At a stop a process has time for what it has held, also on a disk that is slow.
+    // At a stop a process has time to write the poses that it held, also to a slow disk.
     mount.fill(0);
     await_held(&run, &running, 3);
     let holder = running.await_stage("pose-integration");

@@ -18,13 +18,13 @@ pub struct BenchmarkArguments {
     /// The drives, as `gyre batch` takes them: a folder whose sub-folders are recordings, or a
     /// list.
     pub folder: PathBuf,
-    /// The folder of the runs, the table and the files. Default: `out/DATASET`. What is complete
-    /// there is kept.
+    /// The folder of the runs, the table and the files. Default: `out/DATASET`.
+    /// Complete drives in the folder are kept.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
 }
 
-/// Computes the drives that are not complete, and judges all. The exit code is that of the batch.
+/// Computes the drives that are not complete, and judges all. Returns the exit code of the batch.
 pub fn benchmark(arguments: &BenchmarkArguments) -> Result<ExitCode, Failure> {
     let name = arguments.dataset.name;
     let default = || Path::new("out").join(name);

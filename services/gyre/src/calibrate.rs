@@ -10,7 +10,7 @@ use std::{
 };
 
 use clap::Args;
-use gyre_calibration::{Configured, Drive, Found, Study};
+use gyre_calibration::{Configured, Drive, Found, Reversal, Study, Track};
 use gyre_configuration::{
     Configuration, Played, describe_masks_in_process,
     terminal::{Failure, inputs::Inputs, print},
@@ -21,7 +21,8 @@ use gyre_geometry::OwnedScan;
 use gyre_results::{Content, Out};
 use gyre_storage as storage;
 use gyre_tools::bar::Bar;
-use sensors::{Section, Sensor};
+use sensors::Section;
+pub(crate) use sensors::Sensor;
 
 const MAX_SCANS: usize = 2000;
 
@@ -135,6 +136,8 @@ pub(crate) struct Recorded {
     name: String,
     pub(crate) format: Format,
     pub(crate) drive: Drive,
+    pub(crate) track: Track,
+    pub(crate) reversal: Reversal,
     configured: Configured,
     /// In the order of the kinds.
     pub(crate) sensors: Vec<Option<Sensor>>,
@@ -178,11 +181,14 @@ impl Recorded {
             progress.scans(done as u64, done as u64, "read".to_owned());
         }
         progress.finish();
+        let (track, reversal) = drive.mean_track()?;
         let options = with_stored_options(&configuration)?.dataset;
         Ok(Self {
             name: configuration.data(),
             format: dataset.format(),
             drive,
+            track,
+            reversal,
             configured: Configured {
                 geometry: scan.geometry,
                 eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0).into(),
@@ -221,7 +227,7 @@ impl Recorded {
     pub(crate) fn study(self) -> Result<Study, Failure> {
         let scans = self.drive.sweeps.len() as u64;
         let progress = RefCell::new((Bar::new(None), 0));
-        let study = Study::new(self.drive, &self.configured, &|| {
+        let study = Study::new(self.drive, self.track, &self.configured, &|| {
             let (bar, done) = &mut *progress.borrow_mut();
             *done += 1;
             bar.scans(scans, scans, format!("comparison {done} of their parts"));

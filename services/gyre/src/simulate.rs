@@ -82,7 +82,7 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     Ok(arguments.set.iter().cloned().chain(given).collect())
 }
 
-/// Renders a recording for `gyre stress`, in the place of that of an earlier test.
+/// Renders a recording for `gyre stress`, and replaces the recording of an earlier test.
 pub fn replace(simulation: &SimulationConfig, out: &Path) -> Result<(), Failure> {
     match write(simulation, out) {
         Err(SimulatorError::OtherFiles(_)) => {

@@ -1,5 +1,5 @@
-//! Benchmarks: the rules by which the drives of a dataset are judged, and the files that the tools
-//! of the benchmark read.
+//! Benchmarks: the rules that judge the drives of a dataset, and the files that a benchmark's tools
+//! read.
 
 use std::{num::NonZeroUsize, path::Path};
 
@@ -18,7 +18,7 @@ use crate::batch::Row;
 
 /// The table in the folder of the batch.
 const TABLE: &str = "benchmark.csv";
-/// The folder of the files in that of the batch.
+/// The folder of the files, in the folder of the batch.
 const FILES: &str = "files";
 /// The period that fomo-sdk assumes when it looks for the shift of the times.
 const FOMO_PERIOD_NS: i64 = 100_000_000;

@@ -7,6 +7,7 @@ wheels and of a GNSS receiver, which are published beside the azimuths by their 
 """
 
 import os
+import signal
 import socket
 import struct
 import sys
@@ -26,6 +27,8 @@ AZIMUTHS, CONFIGURATIONS = {
     "silent-turns": (ros.RadarBScanMsg, ros.RadarConfigurationMsg),
     "older": (ros.RadarFftDataMessage, ros.RadarConfigurationMessage),
 }.get(publishes, (ros.RadarFftDataMsg, ros.RadarConfigurationMsg))
+# Ctrl-C ends it without a traceback.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
 participant, kept = ros.join(domain)
 # As the driver keeps them: an azimuth each of a turn.
 name = "radar_data/b_scan_msg" if in_turns else "radar_data/fft_data"

@@ -2,7 +2,7 @@
 
 use std::path::{PathBuf, absolute};
 
-use gyre_calibration::{Drive, Kind, SensorSettings, calibrate_sensor, kinds};
+use gyre_calibration::{Kind, SensorSettings, calibrate_sensor, kinds};
 use gyre_configuration::{
     Configuration,
     terminal::{Failure, print},
@@ -125,21 +125,21 @@ impl Section {
         let mut section = Self::default();
         for kind in 0..ROWS.len() {
             let logs = drives.iter();
-            let logs = logs.filter_map(|it| Some((it.sensors[kind].as_ref()?, &it.drive)));
+            let logs = logs.filter_map(|it| Some((it.sensors[kind].as_ref()?, it)));
             section.add(&logs.collect::<Vec<_>>())?;
         }
         Ok(section)
     }
 
     /// Calibrates a sensor by the tracks of drives.
-    fn add(&mut self, logs: &[(&Sensor, &Drive)]) -> Result<(), Failure> {
+    fn add(&mut self, logs: &[(&Sensor, &Recorded)]) -> Result<(), Failure> {
         let (mut told, mut refused) = (Vec::new(), None);
-        for (sensor, drive) in logs {
-            let track = drive.mean_track()?;
+        for (sensor, recorded) in logs {
+            let (drive, track) = (&recorded.drive, &recorded.track);
             let title = format!("{}, log", sensor.kind.sensor.section());
             let (log, max_gap_s) = (&sensor.log, sensor.configured.max_gap_s);
             print::line(format_args!("{title:<21} {}", log.path.display()))?;
-            match calibrate_sensor(sensor.kind, drive, &track, &log.samples, max_gap_s) {
+            match calibrate_sensor(sensor.kind, drive, track, &log.samples, max_gap_s) {
                 Ok(found) => {
                     print::line(found.table(&sensor.configured))?;
                     told.push(found);

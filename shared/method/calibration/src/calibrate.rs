@@ -24,9 +24,12 @@ pub struct Calibration {
 
 /// Finds the facts under which the parts of the scans measure the same motions. Facts that the
 /// drive does not determine stay as configured, and the others are estimated beside them.
-/// `progress` is called some ten times a round.
-pub fn calibrate(drive: &Drive, progress: &dyn Fn()) -> Result<Calibration, CalibrationError> {
-    let track = drive.mean_track()?;
+/// `track` is the drive's mean track; `progress` is called some ten times a round.
+pub fn calibrate(
+    drive: &Drive,
+    track: Track,
+    progress: &dyn Fn(),
+) -> Result<Calibration, CalibrationError> {
     let path_m = track.length_m();
     if path_m < MIN_PATH_M {
         let scans = drive.sweeps.len();

@@ -53,6 +53,29 @@ pub struct Track {
     starts: Vec<bool>,
 }
 
+/// The difference of the track against the order of time from the track in that order.
+#[derive(Clone, Copy, Debug)]
+pub struct Reversal {
+    /// The ratio of the lengths less 1.
+    pub length: f64,
+    /// The turn between the ends over the length, rad/m.
+    pub turn_rad_per_m: f64,
+}
+
+impl Reversal {
+    fn of(forward: &Track, reversed: &Track) -> Self {
+        let [length_m, other_m] = [forward, reversed].map(|it| it.length_m().max(1e-3));
+        let [end, other_end] = [forward, reversed].map(|it| it.poses.last().copied());
+        let turn = end
+            .zip(other_end)
+            .map(|(end, other)| end.inv_mul(&other).rotation.angle());
+        Self {
+            length: other_m / length_m - 1.0,
+            turn_rad_per_m: turn.unwrap_or_default() / length_m,
+        }
+    }
+}
+
 impl Drive {
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self {
@@ -140,29 +163,20 @@ impl Drive {
             .collect()
     }
 
-    pub fn mean_track(&self) -> Result<Track, SettingError> {
+    /// Returns the mean of the tracks in both directions of time, where errors of the processing
+    /// that depend on the direction cancel, and the difference of the two.
+    pub fn mean_track(&self) -> Result<(Track, Reversal), SettingError> {
         self.mean_track_with(&FactVector::zeros())
     }
 
-    /// Returns the mean of the tracks in both directions of time under changed facts: errors of the
-    /// processing that depend on the direction cancel.
-    pub(crate) fn mean_track_with(&self, change: &FactVector) -> Result<Track, SettingError> {
+    pub(crate) fn mean_track_with(
+        &self,
+        change: &FactVector,
+    ) -> Result<(Track, Reversal), SettingError> {
         let [forward, reversed] = [false, true].map(|reversed| self.track(change, reversed));
-        Ok(forward?.mean(&reversed?, self))
-    }
-
-    /// Returns how the track in the order of time differs from the track against it: the ratio of
-    /// their lengths less 1, and the turn between their ends over the length, rad/m.
-    pub fn reversal(&self) -> Result<[f64; 2], SettingError> {
-        let [forward, reversed] = [false, true].map(|it| self.track(&FactVector::zeros(), it));
         let (forward, reversed) = (forward?, reversed?);
-        let [length_m, other_m] = [&forward, &reversed].map(|it| it.length_m().max(1e-3));
-        let ends = [&forward, &reversed].map(|it| it.poses.last().map(|pose| pose.rotation));
-        let turn_rad = match ends {
-            [Some(one), Some(other)] => (one.inverse() * other).angle(),
-            _ => 0.0,
-        };
-        Ok([other_m / length_m - 1.0, turn_rad / length_m])
+        let reversal = Reversal::of(&forward, &reversed);
+        Ok((forward.mean(&reversed, self), reversal))
     }
 
     /// Registers all scans under changed facts, in the order of time or against it.

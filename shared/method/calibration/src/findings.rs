@@ -9,7 +9,7 @@ use std::fmt::{self, Write};
 use gyre_geometry::SweepGeometry;
 
 use crate::{
-    Calibration, CalibrationError, Drive, Estimate, FACTS, Fact, OwnReflections, calibrate,
+    Calibration, CalibrationError, Drive, Estimate, FACTS, Fact, OwnReflections, Track, calibrate,
     facts::FactVector,
 };
 
@@ -65,7 +65,7 @@ enum Verdict {
 
 /// A drive with its findings.
 pub struct Study {
-    pub drive: Drive,
+    drive: Drive,
     calibration: Calibration,
     pub found: Found,
 }
@@ -86,13 +86,14 @@ pub struct Found {
 }
 
 impl Study {
-    /// Calibrates a drive; `progress` is called every few seconds.
+    /// Calibrates a drive with its mean track; `progress` is called every few seconds.
     pub fn new(
         drive: Drive,
+        track: Track,
         configured: &Configured,
         progress: &dyn Fn(),
     ) -> Result<Self, CalibrationError> {
-        let calibration = calibrate(&drive, progress)?;
+        let calibration = calibrate(&drive, track, progress)?;
         let geometry = &configured.geometry;
         // If the scans contain the direction of chirps, its sign is the chirp's.
         let doppler_s = match (drive.alternates, f64::from(geometry.doppler_s)) {
@@ -188,8 +189,8 @@ impl Found {
         })
     }
 
-    /// Measures how much the parts of the scans differ as configured, and with a change of the
-    /// facts: constants with which they differ more are not written.
+    /// Measures the size of the differences between the parts of the scans as configured, and with
+    /// a change of the facts. Constants that increase the differences are not written.
     fn compare(
         &mut self,
         differences: impl FnOnce(&FactVector) -> Result<[f64; 2], CalibrationError>,
@@ -221,7 +222,8 @@ impl Found {
             self.notes.push((RESOLUTION.1, note));
             return Ok(());
         };
-        let path_m = drive.mean_track_with(&self.change())?.length_m();
+        let (track, _) = drive.mean_track_with(&self.change())?;
+        let path_m = track.length_m();
         self.path_m = path_m;
         let ratio = distance_m / path_m;
         if !PLAUSIBLE_RATIO.contains(&ratio) {

@@ -15,7 +15,7 @@ mod parts;
 mod sensor;
 
 pub use calibrate::{Calibration, calibrate};
-pub use drive::{Drive, Sweep, Track};
+pub use drive::{Drive, Reversal, Sweep, Track};
 pub use error::CalibrationError;
 pub use facts::{FACTS, Fact};
 pub use findings::{Configured, Found, Study};

@@ -39,10 +39,11 @@ const REAR: Part = [|point| point.x_m <= 0.0; 2];
 const RISING: Part = [|point| point.doppler_s > 0.0, |point| point.doppler_s < 0.0];
 const FALLING: Part = [RISING[1], RISING[0]];
 const COMPARED: [[Part; 2]; 3] = [[LEFT, RIGHT], [FRONT, REAR], [RISING, FALLING]];
+const FIGURES: usize = 3 * COMPARED.len();
 
 /// The motion by a part less that by the part that it is compared with: x, y (m) and yaw (rad) for
 /// each row of [`COMPARED`].
-type Difference = SVector<f64, 9>;
+type Difference = SVector<f64, FIGURES>;
 
 struct Pair {
     earlier: usize,
@@ -134,10 +135,10 @@ impl<'a> Pairs<'a> {
         Ok(Differences { of_pairs, spread })
     }
 
-    /// Measures what the differences change by, for each fact: per metre between the scans, and of
-    /// the Doppler shift per metre and m/s. The medians over all pairs, since single ones are as
-    /// noisy as the images.
-    fn slopes(&self, at: &FactVector) -> Result<SMatrix<f64, 9, FACTS>, SettingError> {
+    /// Measures the change of the differences by each fact, per metre between the scans (by the
+    /// Doppler shift per metre and m/s). A slope is the median over all pairs, since the slopes of
+    /// single pairs are as noisy as the images.
+    fn slopes(&self, at: &FactVector) -> Result<SMatrix<f64, FIGURES, FACTS>, SettingError> {
         let mut slopes = SMatrix::zeros();
         for fact in Fact::ALL {
             let [above, below] = [1.0, -1.0].map(|sign| {
@@ -146,7 +147,7 @@ impl<'a> Pairs<'a> {
                 self.measure(&shifted)
             });
             let (above, below) = (above?.of_pairs, below?.of_pairs);
-            for k in 0..9 {
+            for k in 0..FIGURES {
                 let each = self.pairs.iter().zip(above.iter().zip(&below));
                 let each = each.filter_map(|(pair, (above, below))| {
                     let step = 2.0 * fact.step() * pair.effect(fact);
@@ -180,7 +181,7 @@ impl<'a> Pairs<'a> {
                     let mut effects = FactVector::zeros();
                     free.iter()
                         .for_each(|fact| effects[*fact as usize] = pair.effect(*fact));
-                    for k in (0..9).filter(|k| here.spread[*k] > 0.0) {
+                    for k in (0..FIGURES).filter(|k| here.spread[*k] > 0.0) {
                         let slope = slopes.row(k).transpose().component_mul(&effects);
                         let left = (difference[k] + slope.dot(&change)).abs() / here.spread[k];
                         let weight = (USUAL_SPREADS / left).min(1.0) / here.spread[k].powi(2);
@@ -245,7 +246,7 @@ impl Differences {
     pub fn size(&self, unit: &Self) -> f64 {
         let of_pairs = self.of_pairs.iter().flatten();
         let each = of_pairs.flat_map(|difference| {
-            let spreads = (0..9).filter(|k| unit.spread[*k] > 0.0);
+            let spreads = (0..FIGURES).filter(|k| unit.spread[*k] > 0.0);
             spreads.map(|k| {
                 (difference[k] / unit.spread[k])
                     .powi(2)

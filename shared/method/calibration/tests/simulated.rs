@@ -36,7 +36,8 @@ fn calibrated(profile: Profile, wrong_by: [f64; 3]) -> Calibration {
         scan.geometry = dataset.read(index, scan.slot()).unwrap();
         drive.push(&scan).unwrap();
     }
-    calibrate(&drive, &|| ()).unwrap()
+    let (track, _) = drive.mean_track().unwrap();
+    calibrate(&drive, track, &|| ()).unwrap()
 }
 
 fn assert_found(profile: Profile, doppler_wrong_by_s: f64) {

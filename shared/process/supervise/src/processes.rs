@@ -16,7 +16,7 @@ use crate::{
     guardian::Guardian, recovery::Recovery, run::Run,
 };
 
-/// Time without progress for a process that writes what it has held while the disk was full.
+/// Time without progress of a process that writes the poses that it held while the disk was full.
 const CATCH_UP: Duration = Duration::from_secs(10);
 
 #[derive(Default)]

@@ -4,7 +4,7 @@ use gyre_geometry::Pose;
 
 use crate::evaluation::{MatchedPoses, SEGMENT_LENGTHS_M, ate::align_about};
 
-/// The share of a length by which the path between two poses may differ from it.
+/// Largest relative difference between a length and the path between the two poses of a pair.
 const TOLERANCE: f64 = 0.1;
 
 /// Errors after an alignment that takes the first position to the true one, and fits the rest of

@@ -1,4 +1,4 @@
-//! The poses at which the keyframes of a run are drawn.
+//! The poses of a run's keyframes on a map.
 
 use std::path::{Path, PathBuf};
 
@@ -12,13 +12,13 @@ use super::trajectory_of;
 
 pub struct Poses {
     pub path: PathBuf,
-    /// The run's own has the numbers of its scans for times: its clock may step back.
+    /// The run's own trajectory has the numbers of its scans as times: its clock may step back.
     trajectory: Trajectory,
     is_of_run: bool,
 }
 
 impl Poses {
-    /// Reads the trajectory of a run, or another one of the same drive, which has times.
+    /// Reads the trajectory of a run, or a different trajectory of the same drive, which has times.
     pub fn read(run: &Path, other: Option<&PathBuf>) -> Result<Self, Failure> {
         let path = other.cloned().unwrap_or_else(|| trajectory_of(run));
         let trajectory = match other {

@@ -75,7 +75,7 @@ fn velocity_is_in_the_frame_of_the_vehicle() {
 const OF_MOTION: Matrix3<f64> =
     Matrix3::new(0.04, 0.01, 0.002, 0.01, 0.09, -0.001, 0.002, -0.001, 0.0004);
 
-/// Returns the covariance of what is computed of a motion (x, y and yaw) with [`OF_MOTION`].
+/// Returns the covariance of a function of a motion (x, y and yaw) with [`OF_MOTION`].
 fn by_small_errors(
     of: impl Fn([f64; 3]) -> nalgebra::Vector3<f64>,
     motion: [f64; 3],
